@@ -19,14 +19,20 @@ __all__ = [
     "AXES",
     "BoolArray",
     "Channel",
+    "Cleaned",
+    "CleanedChannel",
     "Edit",
     "Event",
     "Fixes",
     "FloatArray",
     "IntArray",
     "Log",
+    "Noise",
     "Problem",
+    "Reason",
+    "Track",
     "Verdict",
+    "Verdicts",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -172,3 +178,166 @@ class Log:
     events: tuple[Event, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     """Records met by kind (sentence type, row); for `surefix info`."""
+
+
+class Reason(IntEnum):
+    """Why a verdict was given; `surefix.reasons.texts` turns it into a sentence."""
+
+    AGREES = 0
+    FIRST = 1
+    OFF = 2
+    AXIS_OFF = 3
+    JUMP = 4
+    RESTART = 5
+    NO_POSITION = 6
+    NO_TIME = 7
+    INVALID = 8
+    IMPLAUSIBLE = 9
+    REPEATED = 10
+    HELD = 11
+    LATE = 12
+    ACCEPTED_BY_USER = 13
+    REJECTED_BY_USER = 14
+
+
+class Verdicts(NamedTuple):
+    """The core record: what was done with each observation, and why.
+
+    Parameters
+    ----------
+    verdict
+        (n,) codes of `Verdict`.
+    weight
+        (n,) 0 … 1, the share of its information that was used.
+    innovation_sigma
+        (n,) how far the observation lay from its prediction, in standard deviations of the
+        innovation, as a one-axis equivalent (Mahalanobis distance over the axes that share a
+        weight); NaN where nothing was predicted.
+    standardised
+        (n, 3) innovation per axis over its standard deviation, signed; NaN where not observed.
+    reason
+        (n,) codes of `Reason`.
+    detail
+        (n,) the figure that goes with the reason: a time in s (JUMP, HELD, LATE: the time it refers
+        to), a duration in s (RESTART) or an axis mask (AXIS_OFF: bit 0 horizontal, bit 1 vertical).
+    """
+
+    verdict: IntArray
+    weight: FloatArray
+    innovation_sigma: FloatArray
+    standardised: FloatArray
+    reason: IntArray
+    detail: FloatArray
+
+
+class Track(NamedTuple):
+    """A track with its uncertainty, one row an epoch, in the order of time.
+
+    Parameters
+    ----------
+    time
+        (n,) s.
+    position, velocity
+        (n, 3) local x east, y north, z up in m, and m/s.
+    sigma_position, sigma_velocity
+        (n, 3) standard deviations, m and m/s.
+    geodetic
+        (n, 3) latitude deg, longitude deg, height m, or None for metric input.
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    sigma_position: FloatArray
+    sigma_velocity: FloatArray
+    geodetic: FloatArray | None
+
+
+class Noise(NamedTuple):
+    """One noise figure the filter used.
+
+    Parameters
+    ----------
+    sensor
+        Whose noise it is; ``motion`` for the process noise.
+    quantity
+        ``position``, ``height``, ``velocity``, ``vertical velocity``, ``acceleration`` …
+    value, unit
+        The figure: a standard deviation, or the root of a spectral density for the motion.
+    source
+        ``estimated``, ``given`` or ``declared`` (per record, by the sensor).
+    """
+
+    sensor: str
+    quantity: str
+    value: float
+    unit: str
+    source: str
+
+
+class CleanedChannel(NamedTuple):
+    """A cleaned scalar series; arrays of length n in the order of time.
+
+    ``value`` is the clean series, ``rate`` its change per second, ``sigma`` its standard deviation,
+    ``raw`` the input. ``verdicts.standardised`` has shape (n, 1).
+    """
+
+    name: str
+    sensor: str
+    time: FloatArray
+    raw: FloatArray
+    value: FloatArray
+    rate: FloatArray
+    sigma: FloatArray
+    period: float
+    verdicts: Verdicts
+    noise: tuple[Noise, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cleaned:
+    """The result of cleaning a log: every view (files, report, dashboard) is made from it.
+
+    Rows of ``track``, ``verdicts`` and ``raw_position`` correspond: one per input fix.
+
+    Parameters
+    ----------
+    sources
+        Names of the inputs.
+    sensors
+        Names of the position sensors; ``sensor`` indexes them.
+    track, verdicts
+        The clean track and what was done with each fix.
+    raw_position
+        (n, 3) the input fixes in local m; NaN where missing.
+    raw_coordinates
+        (n, 3) the input fixes as they were given (latitude, longitude, height, or x, y, z).
+    sensor, row
+        (n,) sensor index and record number in the input.
+    has_depth
+        True where the input gave depth (positive down) rather than height.
+    resampled
+        The track at regular times, if that was asked for.
+    channels
+        Scalar series cleaned beside it.
+    noise, events, problems
+        Noise figures used; what to know about the log; bad input counted.
+    settings
+        Every option as used, by name, and versions; for the report and the JSON summary.
+    """
+
+    sources: tuple[str, ...]
+    sensors: tuple[str, ...]
+    track: Track
+    verdicts: Verdicts
+    raw_position: FloatArray
+    raw_coordinates: FloatArray
+    sensor: IntArray
+    row: IntArray
+    has_depth: bool
+    resampled: Track | None
+    channels: tuple[CleanedChannel, ...]
+    noise: tuple[Noise, ...]
+    events: tuple[Event, ...]
+    problems: tuple[Problem, ...]
+    settings: Mapping[str, str]

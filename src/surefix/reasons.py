@@ -1,0 +1,75 @@
+"""Verdicts in words: the sentence a surveyor reads beside each fix."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+
+from surefix.types import Reason, Verdict, Verdicts
+
+__all__ = ["clock", "texts"]
+
+_CALENDAR_FROM = 1e8  # s; smaller times count from the start of a log and carry no date
+
+_FIXED = {
+    Reason.AGREES: "agrees",
+    Reason.FIRST: "the track starts here",
+    Reason.NO_POSITION: "no position",
+    Reason.NO_TIME: "no time",
+    Reason.INVALID: "marked invalid by the sensor",
+    Reason.IMPLAUSIBLE: "not a possible position",
+    Reason.ACCEPTED_BY_USER: "accepted by the user",
+    Reason.REJECTED_BY_USER: "rejected by the user",
+}
+_BLOCKS = {1: "horizontally", 2: "vertically", 3: "horizontally and vertically"}
+
+
+def clock(time: float) -> str:
+    """Time of day of a Unix time, or seconds where the time has no date.
+
+    >>> clock(1699643598.72), clock(12.5)
+    ('19:13:18.7', '12.5 s')
+    """
+    if not math.isfinite(time):
+        return "an unknown time"
+    if abs(time) < _CALENDAR_FROM:
+        return f"{time:.1f} s"
+    tenths = round(time * 10.0)
+    return f"{datetime.fromtimestamp(tenths // 10, UTC):%H:%M:%S}.{tenths % 10}"
+
+
+def _text(reason: int, verdict: int, weight: float, sigma: float, detail: float) -> str:
+    match reason:
+        case Reason.OFF if verdict == Verdict.REJECTED:
+            return f"{sigma:.1f} σ off"
+        case Reason.OFF:
+            return f"{sigma:.1f} σ off, weight {weight:.2f}"
+        case Reason.AXIS_OFF:
+            return f"{sigma:.1f} σ off {_BLOCKS[int(detail)]}, the rest used"
+        case Reason.JUMP:
+            return f"jump accepted, dated back to {clock(detail)}"
+        case Reason.RESTART:
+            return f"the track starts anew after {detail:.0f} s without a fix"
+        case Reason.REPEATED:
+            return f"the same record again, first at {clock(detail)}"
+        case Reason.HELD:
+            return f"held: the fix of {clock(detail)} polled again"
+        case Reason.LATE:
+            return f"arrived after the fix of {clock(detail)} was already out"
+        case _:
+            return _FIXED[Reason(reason)]
+
+
+def texts(verdicts: Verdicts) -> list[str]:
+    """One sentence per observation."""
+    return [
+        _text(*row)
+        for row in zip(
+            verdicts.reason.tolist(),
+            verdicts.verdict.tolist(),
+            verdicts.weight.tolist(),
+            verdicts.innovation_sigma.tolist(),
+            verdicts.detail.tolist(),
+            strict=True,
+        )
+    ]
