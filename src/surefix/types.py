@@ -99,7 +99,7 @@ class Fixes(NamedTuple):
 
 
 class Channel(NamedTuple):
-    """A scalar series beside the position: depth, heading, speed …
+    """A scalar series beside the position: depth, heading, speed and the like.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Problem(NamedTuple):
     ----------
     kind
         Short stable name, such as ``checksum`` or ``no-checksum``.
-    count
+    total
         How often it was met.
     example
         The first one, with its line: ``line 12: $GPGGA,…``.
@@ -139,7 +139,7 @@ class Problem(NamedTuple):
     """
 
     kind: str
-    count: int
+    total: int
     example: str
     remedy: str = ""
 

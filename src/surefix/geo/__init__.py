@@ -1,1 +1,1 @@
-
+"""Time, angles and the local frame."""

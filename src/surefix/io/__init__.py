@@ -1,1 +1,1 @@
-
+"""Reading logs and writing tracks."""

@@ -1,1 +1,1 @@
-
+"""Motion models."""

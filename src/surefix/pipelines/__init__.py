@@ -1,1 +1,1 @@
-
+"""Options in, result out: what the command line and the library run."""

@@ -1,1 +1,1 @@
-
+"""Robust losses: the weight of a residual, and gates."""

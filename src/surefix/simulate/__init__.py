@@ -1,1 +1,1 @@
-
+"""Seeded truth with sensors and faults, one file per scenario."""
