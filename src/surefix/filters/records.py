@@ -1,0 +1,133 @@
+"""Records of the track filter: what goes in, what it remembers, what it finds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["Epochs", "Filtered", "Motion", "Recovery", "TrackState"]
+
+
+class Motion(NamedTuple):
+    """A motion model (see `surefix.models.motion`).
+
+    Parameters
+    ----------
+    order
+        2 constant velocity, 3 constant acceleration.
+    axes
+        1 … 3.
+    density
+        (axes,) spectral density of the driving white noise.
+    group
+        (2·axes,) group of each component of the observation; position groups come first.
+    groups
+        How many groups there are.
+    period
+        Period of an angle in its own unit, or 0; for one axis.
+    """
+
+    order: int
+    axes: int
+    density: FloatArray
+    group: IntArray
+    groups: int
+    period: float
+
+
+class Recovery(NamedTuple):
+    """When a rejected group is believed after all.
+
+    Parameters
+    ----------
+    after
+        Seconds of unbroken rejection; infinity for never.
+    sigma_velocity
+        Standard deviation of a velocity nothing is known about, m/s.
+    """
+
+    after: float
+    sigma_velocity: float
+
+
+class Epochs(NamedTuple):
+    """Observations in the order of time; n epochs, m = 2·axes components.
+
+    Parameters
+    ----------
+    time
+        (n,) s, not decreasing.
+    z
+        (n, m) position in m, then velocity in m/s; NaN is missing.
+    variance
+        (n, m) variance of each component.
+    fixed
+        (n, groups) weights decided beforehand (0 rejects, 1 uses); NaN lets the loss decide.
+    jump
+        (n,) bit mask of the groups whose state restarts before this epoch.
+    """
+
+    time: FloatArray
+    z: FloatArray
+    variance: FloatArray
+    fixed: FloatArray
+    jump: IntArray
+
+
+class TrackState(NamedTuple):
+    """All the filter remembers; a plain record that can be stored and restored.
+
+    Parameters
+    ----------
+    time
+        s; NaN before the first epoch.
+    mean, factor
+        (n,) state and (n, n) factor S of its covariance S Sᵀ.
+    settled
+        (groups,) observations used since the group's state was last unknown.
+    streak, since
+        (groups,) rejections on end, and the time of the first of them.
+    recent
+        (5, m) the last rejected observations of each component.
+    """
+
+    time: float
+    mean: FloatArray
+    factor: FloatArray
+    settled: IntArray
+    streak: IntArray
+    since: FloatArray
+    recent: FloatArray
+
+
+class Filtered(NamedTuple):
+    """What the filter found at each of n epochs.
+
+    Parameters
+    ----------
+    mean, factor
+        (n, states), (n, states, states) after the update.
+    weight
+        (n, groups); NaN where the group was not observed.
+    sigma
+        (n, groups) Mahalanobis distance from the prediction, as a one-axis equivalent.
+    standardised
+        (n, m) innovation over its standard deviation.
+    nis, logdet
+        (n, groups) squared Mahalanobis distance and log-determinant of the innovation covariance.
+    jump
+        (n,) bit mask of groups that restarted at this epoch.
+    since
+        (n, groups) s, the first rejection of the run that a restart ended; else NaN.
+    """
+
+    mean: FloatArray
+    factor: FloatArray
+    weight: FloatArray
+    sigma: FloatArray
+    standardised: FloatArray
+    nis: FloatArray
+    logdet: FloatArray
+    jump: IntArray
+    since: FloatArray

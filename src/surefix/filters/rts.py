@@ -1,0 +1,298 @@
+"""Rauch–Tung–Striebel smoothing of a filtered track, over the whole series or a fixed lag.
+
+The gain and the part of the covariance that the future cannot reduce come from one orthogonal
+reduction of the filter's factors, so that every smoothed covariance is a sum of positive
+semi-definite terms (Park and Kailath, Int. J. Control 62, 1995).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.filters.records import Filtered, Motion, Recovery
+from surefix.filters.track_step import predict_factor
+from surefix.jit import helper, kernel
+from surefix.linalg import triangularize
+from surefix.models.motion import propagate_rows
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["Smoothed", "leave_one_out", "smooth", "smooth_lag"]
+
+
+class Smoothed(NamedTuple):
+    """Smoothed states: ``mean`` (n, states) and ``covariance`` (n, states, states)."""
+
+    mean: FloatArray
+    covariance: FloatArray
+
+
+class _Backward(NamedTuple):
+    """Per epoch k: ``x_k = x_f + G (x_{k+1} − F x_f)``, ``P_k = floor + G P_{k+1} Gᵀ``."""
+
+    gain: FloatArray
+    floor: FloatArray
+    predicted: FloatArray
+
+
+def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered) -> Smoothed:
+    """Smooth a whole filtered series.
+
+    Parameters
+    ----------
+    motion, recovery
+        As given to the filter.
+    time
+        (n,) s, the epochs.
+    filtered
+        What the filter found; its jumps cut the series for the groups they concern.
+    """
+    n, states = filtered.mean.shape
+    out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
+    if n:
+        back = _backward(motion, recovery, time, filtered)
+        last = np.full(n, n - 1)
+        _smooth(filtered, back, last, True, out)
+    return out
+
+
+def smooth_lag(
+    motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered, lag: float
+) -> Smoothed:
+    """Smooth every epoch with the ``lag`` seconds of data that follow it, and no more.
+
+    Arguments as for `smooth`.
+    """
+    n, states = filtered.mean.shape
+    out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
+    if n:
+        back = _backward(motion, recovery, time, filtered)
+        last = np.searchsorted(time, time + lag, side="right") - 1
+        _smooth(filtered, back, last, False, out)
+    return out
+
+
+def _backward(
+    motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered
+) -> _Backward:
+    n, states = filtered.mean.shape
+    back = _Backward(
+        np.zeros((n, states, states)), np.zeros((n, states, states)), np.zeros((n, states))
+    )
+    _reduce(motion, recovery.sigma_velocity, time, filtered, back)
+    return back
+
+
+@kernel
+def _reduce(
+    motion: Motion, sigma_velocity: float, time: FloatArray, filtered: Filtered, back: _Backward
+) -> None:
+    """Reduce ``[[F S, G], [S, 0]]`` to ``[[L, 0], [Y, D]]``: gain ``Y L⁻¹``, floor ``D Dᵀ``."""
+    epochs, n = filtered.mean.shape
+    A = np.empty((2 * n, 2 * n))
+    for k in range(epochs - 1):
+        S, dt = filtered.factor[k], time[k + 1] - time[k]
+        predict_factor(A, S, motion, dt, filtered.jump[k + 1], sigma_velocity)
+        for i in range(n):
+            back.predicted[k, i] = filtered.mean[k, i]
+            for j in range(n):
+                A[n + i, j] = S[i, j]
+                A[n + i, n + j] = 0.0
+        propagate_rows(back.predicted[k].reshape(n, 1), motion.order, motion.axes, dt, 1)
+        triangularize(A, 2 * n, 2 * n)
+        for i in range(n):
+            for j in range(n - 1, -1, -1):
+                total = A[n + i, j]
+                for l in range(j + 1, n):
+                    total -= back.gain[k, i, l] * A[l, j]
+                back.gain[k, i, j] = total / A[j, j] if A[j, j] != 0.0 else 0.0
+            for j in range(i + 1):
+                total = 0.0
+                for l in range(n):
+                    total += A[n + i, n + l] * A[n + j, n + l]
+                back.floor[k, i, j] = total
+                back.floor[k, j, i] = total
+
+
+@helper
+def _step_back(
+    k: int, filtered: Filtered, back: _Backward, x: FloatArray, P: FloatArray, W: FloatArray
+) -> None:
+    """Carry the smoothed state (x, P) of epoch k + 1 back to epoch k, in place."""
+    n = x.shape[0]
+    for i in range(n):
+        x[i] -= back.predicted[k, i]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for l in range(n):
+                total += back.gain[k, i, l] * P[l, j]
+            W[i, j] = total
+    for i in range(n):
+        shift = 0.0
+        for l in range(n):
+            shift += back.gain[k, i, l] * x[l]
+        W[i, n] = shift
+    for i in range(n):
+        x[i] = filtered.mean[k, i] + W[i, n]
+        for j in range(i + 1):
+            total = back.floor[k, i, j]
+            for l in range(n):
+                total += W[i, l] * back.gain[k, j, l]
+            P[i, j] = total
+            P[j, i] = total
+
+
+@helper
+def _begin(k: int, filtered: Filtered, x: FloatArray, P: FloatArray) -> None:
+    """Set (x, P) to the filtered state of epoch k."""
+    n = x.shape[0]
+    S = filtered.factor[k]
+    for i in range(n):
+        x[i] = filtered.mean[k, i]
+        for j in range(n):
+            total = 0.0
+            for l in range(n):
+                total += S[i, l] * S[j, l]
+            P[i, j] = total
+
+
+@kernel
+def _smooth(
+    filtered: Filtered, back: _Backward, last: IntArray, whole: bool, out: Smoothed
+) -> None:
+    """Smooth epoch k with the data up to epoch ``last[k]``; in one sweep if ``whole``."""
+    epochs, n = filtered.mean.shape
+    x = np.empty(n)
+    P = np.empty((n, n))
+    W = np.empty((n, n + 1))
+    for k in range(epochs - 1, -1, -1):
+        if whole and k < epochs - 1:
+            _step_back(k, filtered, back, x, P, W)
+        else:
+            _begin(last[k], filtered, x, P)
+            for j in range(last[k] - 1, k - 1, -1):
+                _step_back(j, filtered, back, x, P, W)
+        for i in range(n):
+            out.mean[k, i] = x[i]
+            for j in range(n):
+                out.covariance[k, i, j] = P[i, j]
+
+
+def leave_one_out(
+    motion: Motion,
+    z: FloatArray,
+    variance: FloatArray,
+    weight: FloatArray,
+    smoothed: Smoothed,
+) -> tuple[FloatArray, FloatArray]:
+    """How far each observation lies from what all the others say of it.
+
+    The observation's own share is taken out of the smoothed state in closed form:
+    ``e = R̄ D⁻¹ (z − Hx)``, ``P = R̄ D⁻¹ R̄ − R̄`` with ``D = R̄ − H P Hᵀ`` and ``R̄ = R/w``.
+
+    Parameters
+    ----------
+    motion
+        Model and groups.
+    z, variance
+        (n, m) observations and their variances.
+    weight
+        (n, groups) weights with which they were used.
+    smoothed
+        Smoothed states of the same epochs.
+
+    Returns
+    -------
+    nis, standardised
+        (n, groups) squared Mahalanobis distance of the deleted residual, and (n, m) the residual
+        over its standard deviation; NaN where not observed or where nothing else is known.
+    """
+    n, m = z.shape
+    nis = np.full((n, motion.groups), np.nan)
+    standardised = np.full((n, m), np.nan)
+    _delete_residuals(motion, z, variance, weight, smoothed, nis, standardised)
+    return nis, standardised
+
+
+@kernel
+def _delete_residuals(
+    motion: Motion,
+    z: FloatArray,
+    variance: FloatArray,
+    weight: FloatArray,
+    smoothed: Smoothed,
+    nis: FloatArray,
+    standardised: FloatArray,
+) -> None:
+    m = z.shape[1]
+    index = np.empty(m, np.int64)
+    residual = np.empty(m)
+    for k in range(z.shape[0]):
+        for g in range(motion.groups):
+            count = 0
+            for c in range(m):
+                if motion.group[c] == g and not np.isnan(z[k, c]):
+                    index[count] = c
+                    e = z[k, c] - smoothed.mean[k, c]
+                    if motion.period > 0.0 and c == 0:
+                        e -= motion.period * np.rint(e / motion.period)
+                    residual[count] = e
+                    count += 1
+            if count == 0:
+                continue
+            total = np.zeros((count, count))
+            D = np.zeros((count, count))
+            e_out = np.zeros(count)
+            w = weight[k, g]
+            for i in range(count):
+                for j in range(count):
+                    total[i, j] = smoothed.covariance[k, index[i], index[j]]
+                e_out[i] = residual[i]
+            if w > 0.0:
+                for i in range(count):
+                    for j in range(count):
+                        D[i, j] = -total[i, j]
+                    D[i, i] += variance[k, index[i]] / w
+                if not _invert(D, count):
+                    continue
+                for i in range(count):
+                    ri = variance[k, index[i]] / w
+                    shift = 0.0
+                    for j in range(count):
+                        rj = variance[k, index[j]] / w
+                        shift += D[i, j] * residual[j]
+                        total[i, j] = ri * D[i, j] * rj
+                    total[i, i] -= ri
+                    e_out[i] = ri * shift
+            for i in range(count):
+                total[i, i] += variance[k, index[i]]
+                standardised[k, index[i]] = e_out[i] / np.sqrt(total[i, i])
+            if not _invert(total, count):
+                continue
+            d2 = 0.0
+            for i in range(count):
+                for j in range(count):
+                    d2 += e_out[i] * total[i, j] * e_out[j]
+            nis[k, g] = d2
+
+
+@helper
+def _invert(A: FloatArray, n: int) -> bool:
+    """Overwrite a symmetric positive definite matrix by its inverse (Gauss–Jordan)."""
+    for p in range(n):
+        pivot = A[p, p]
+        if not pivot > 0.0:
+            return False
+        A[p, p] = 1.0
+        for j in range(n):
+            A[p, j] /= pivot
+        for i in range(n):
+            if i == p:
+                continue
+            f = A[i, p]
+            A[i, p] = 0.0
+            for j in range(n):
+                A[i, j] -= f * A[p, j]
+    return True
