@@ -1,0 +1,256 @@
+"""Noise figures from the data: nobody has to know them, and a user's figure always wins.
+
+The measurement noise of every sensor and the density of the process noise maximise the likelihood
+of the innovations of a gated filter, each innovation being normal with probability 1 − ε and
+anywhere within a wide window otherwise: gross errors cost a constant, whatever their size.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.track import filter_track, start
+from surefix.robust.loss import loss_named
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["NoiseFigures", "Observations", "difference_scale", "estimate_noise", "speed_scale"]
+
+_OUTLIERS = 0.05  # prior share of gross errors
+_WINDOW = 100.0  # width of the window gross errors fall in, in initial standard deviations
+_Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
+_SAMPLE = 3000  # epochs the likelihood is evaluated on
+
+
+class Observations(NamedTuple):
+    """Observations of a set of axes that share their noise figures.
+
+    Parameters
+    ----------
+    time
+        (n,) s, not decreasing.
+    z
+        (n, 2a) position, then velocity of a axes; NaN is missing.
+    sensor
+        (n,) which sensor each row came from.
+    declared
+        (n, 2a) standard deviations that came with the records; NaN where none did.
+    """
+
+    time: FloatArray
+    z: FloatArray
+    sensor: IntArray
+    declared: FloatArray
+
+
+class NoiseFigures(NamedTuple):
+    """Standard deviations by sensor, and the root of the process noise density.
+
+    ``position`` and ``velocity`` are (sensors,), m and m/s, NaN where the sensor has no such
+    observation; ``process`` is √q, m/s^1.5 for constant velocity.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    process: float
+
+
+def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> float:
+    """Standard deviation of the noise of a series, from each value and its two neighbours.
+
+    ``z_k`` minus the straight line between its neighbours has variance ``σ²(1 + a² + b²)``; the
+    lower quartile of the normalised differences survives two thirds of bad triples. Motion adds to
+    it, so it is an upper bound. NaN if there are fewer than three distinct times.
+
+    Parameters
+    ----------
+    time, z
+        (n,) series without NaN; ``period`` > 0 for angles.
+
+    >>> difference_scale(np.arange(5.0), np.array([0.0, 1.0, 2.0, 3.0, 4.0]))
+    0.0
+    """
+    keep = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    t, y = time[keep], z[keep]
+    if period > 0.0:
+        y = np.unwrap(y, period=period)
+    if len(t) < 3:
+        return float("nan")
+    a = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
+    residual = y[1:-1] - (a * y[:-2] + (1.0 - a) * y[2:])
+    return float(np.quantile(np.abs(residual) / np.sqrt(1.0 + a**2 + (1.0 - a) ** 2), 0.25) / _Q25)
+
+
+def speed_scale(time: FloatArray, z: FloatArray, span: int = 10) -> float:
+    """Twice the 90 % quantile of the speed over ``span`` observations along one axis, m/s."""
+    span = min(span, len(time) - 1)
+    if span < 1:
+        return 1.0
+    dt = time[span:] - time[:-span]
+    step = np.abs(z[span:] - z[:-span])[dt > 0.0]
+    return 2.0 * float(np.quantile(step / dt[dt > 0.0], 0.9)) if len(step) else 1.0
+
+
+def estimate_noise(
+    observations: Observations,
+    given: NoiseFigures,
+    *,
+    order: int = 2,
+    period: float = 0.0,
+    quantum: float = 0.0,
+) -> NoiseFigures:
+    """Estimate the noise figures that ``given`` leaves NaN.
+
+    Parameters
+    ----------
+    observations
+        A sample of the log; the first few thousand rows are used, evenly thinned per sensor.
+    given
+        Figures that are known; their length tells how many sensors there are.
+    order, period
+        Of the motion model.
+    quantum
+        Resolution of the positions: no noise estimate falls below ``quantum/√12``.
+    """
+    sample = _thin(observations)
+    axes = sample.z.shape[1] // 2
+    start_position = _initial(sample, given.position, slice(0, axes), period)
+    start_velocity = _initial(sample, given.velocity, slice(axes, 2 * axes), 0.0)
+    floor = max(quantum / np.sqrt(12.0), 1e-9)
+    position, velocity = np.fmax(start_position, floor), np.fmax(start_velocity, 1e-9)
+    free_position = np.isnan(given.position) & np.isfinite(start_position)
+    free_velocity = np.isnan(given.velocity) & np.isfinite(start_velocity)
+    free_process = np.isnan(given.process)
+    position[~np.isfinite(start_position)] = np.nan
+    velocity[~np.isfinite(start_velocity)] = np.nan
+    reference = _reference_process(sample, position, order)
+    scale = NoiseFigures(position.copy(), velocity.copy(), reference)
+
+    def figures(theta: FloatArray) -> NoiseFigures:
+        p, v, i = position.copy(), velocity.copy(), int(free_position.sum())
+        j = i + int(free_velocity.sum())
+        p[free_position] = np.maximum(scale.position[free_position] * np.exp(theta[:i]), floor)
+        v[free_velocity] = scale.velocity[free_velocity] * np.exp(theta[i:j])
+        process = reference * np.exp(theta[j]) if free_process else given.process
+        return NoiseFigures(p, v, float(process))
+
+    def cost(theta: FloatArray) -> float:
+        return _cost(sample, figures(theta), scale, order, period)
+
+    size = int(free_position.sum()) + int(free_velocity.sum()) + int(free_process)
+    if size == 0 or len(sample.time) < 3:
+        return figures(np.zeros(size))
+    best = np.zeros(size)
+    if free_process:
+        trials = np.array([[*best[:-1], level] for level in np.arange(-9.0, 3.1, 1.5)])
+        best = trials[int(np.argmin([cost(trial) for trial in trials]))]
+    simplex = np.vstack([best, best - 0.7 * np.eye(size)])
+    found = minimize(
+        cost,
+        best,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1, "maxiter": 60 * size},
+    )
+    return figures(found.x)
+
+
+def _thin(observations: Observations) -> Observations:
+    """At most a few thousand rows: the head of the slowest sensor, the others thinned to match."""
+    present = np.isfinite(observations.z).any(axis=1)
+    sensors, counts = np.unique(observations.sensor[present], return_counts=True)
+    if not len(sensors):
+        return Observations(*(field[:0] for field in observations))
+    each = _SAMPLE // len(sensors)
+    until = np.inf
+    for sensor, count in zip(sensors, counts, strict=True):
+        if count > each and count == counts.min():
+            until = observations.time[present & (observations.sensor == sensor)][each]
+    keep = np.zeros(len(present), bool)
+    for sensor in sensors:
+        rows = np.flatnonzero(
+            present & (observations.sensor == sensor) & (observations.time <= until)
+        )
+        keep[rows[:: -(-len(rows) // each)] if len(rows) > 2 * each else rows] = True
+    return Observations(*(field[keep] for field in observations))
+
+
+def _initial(sample: Observations, given: FloatArray, columns: slice, period: float) -> FloatArray:
+    """Per sensor: the given figure, or the difference scale over the axes; NaN if unobserved."""
+    out = given.copy()
+    for sensor in range(len(given)):
+        rows = sample.sensor == sensor
+        scales = []
+        for c in range(*columns.indices(sample.z.shape[1])):
+            seen = rows & np.isfinite(sample.z[:, c])
+            scales.append(difference_scale(sample.time[seen], sample.z[seen, c], period))
+            if not np.isfinite(scales[-1]) and seen.any():
+                scales[-1] = 1.0
+        usable = [s for s in scales if np.isfinite(s)]
+        if np.isnan(out[sensor]) and usable:
+            positive = [s for s in usable if s > 0.0]
+            out[sensor] = max(positive) if positive else 1e-3
+        elif not usable:
+            out[sensor] = np.nan
+    return out
+
+
+def _reference_process(sample: Observations, position: FloatArray, order: int) -> float:
+    """√q at which a step's process noise equals the measurement noise."""
+    dt = np.diff(sample.time)
+    step = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else 1.0
+    seen = position[np.isfinite(position)]
+    sigma = float(seen.min()) if len(seen) else 1.0
+    return sigma / step ** (order - 0.5)
+
+
+def variances(observations: Observations, figures: NoiseFigures) -> FloatArray:
+    """(n, 2a) variance of every observation: declared by its record, else its sensor's figure."""
+    axes = observations.z.shape[1] // 2
+    sigma = np.empty_like(observations.z)
+    sigma[:, :axes] = figures.position[observations.sensor, None]
+    sigma[:, axes:] = figures.velocity[observations.sensor, None]
+    known = np.isfinite(observations.declared)
+    sigma[known] = observations.declared[known]
+    sigma[~np.isfinite(sigma)] = 1.0
+    return sigma**2
+
+
+def _cost(
+    sample: Observations, figures: NoiseFigures, scale: NoiseFigures, order: int, period: float
+) -> float:
+    """Negative log-likelihood of the innovations under the mixture."""
+    axes = sample.z.shape[1] // 2
+    n = len(sample.time)
+    group = np.repeat([0, 1], axes)
+    motion = Motion(order, axes, np.full(axes, figures.process**2), group, 2, period)
+    dt = np.diff(sample.time)
+    typical = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else 1.0
+    speed = max(speed_scale(sample.time, np.nan_to_num(sample.z[:, 0])), 1e-6)
+    recovery = Recovery(30.0 * typical, speed)
+    epochs = Epochs(
+        sample.time,
+        sample.z,
+        variances(sample, figures),
+        np.full((n, 2), np.nan),
+        np.zeros(n, np.int64),
+    )
+    gate = loss_named("gate", false_alarm=1e-4)
+    _, out, _ = filter_track(motion, gate, recovery, epochs, start(motion, recovery))
+    total = 0.0
+    for g, reference in ((0, scale.position), (1, scale.velocity)):
+        seen = np.isfinite(out.nis[:, g])
+        if not seen.any():
+            continue
+        observed = np.isfinite(sample.z[seen, g * axes : (g + 1) * axes]).sum(axis=1)
+        log_normal = -0.5 * (out.nis[seen, g] + out.logdet[seen, g]) - observed * 0.5 * np.log(
+            2 * np.pi
+        )
+        window = _WINDOW * np.nan_to_num(reference[sample.sensor[seen]], nan=1.0)
+        log_uniform = -observed * np.log(window)
+        total -= np.logaddexp(np.log1p(-_OUTLIERS) + log_normal, np.log(_OUTLIERS) + log_uniform)[
+            min(3, len(log_normal)) :
+        ].sum()
+    return float(total)
