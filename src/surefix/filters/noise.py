@@ -15,14 +15,22 @@ from scipy.optimize import minimize
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import filter_track, start
 from surefix.robust.loss import loss_named
-from surefix.types import FloatArray, IntArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["NoiseFigures", "Observations", "difference_scale", "estimate_noise", "speed_scale"]
+__all__ = [
+    "NoiseFigures",
+    "Observations",
+    "difference_scale",
+    "estimate_noise",
+    "speed_scale",
+    "variances",
+]
 
 _OUTLIERS = 0.05  # prior share of gross errors
 _WINDOW = 100.0  # width of the window gross errors fall in, in initial standard deviations
 _Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
 _SAMPLE = 3000  # epochs the likelihood is evaluated on
+_BLOCKS = 6  # stretches of the log they come from
 
 
 class Observations(NamedTuple):
@@ -81,7 +89,8 @@ def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> fl
         return float("nan")
     a = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
     residual = y[1:-1] - (a * y[:-2] + (1.0 - a) * y[2:])
-    return float(np.quantile(np.abs(residual) / np.sqrt(1.0 + a**2 + (1.0 - a) ** 2), 0.25) / _Q25)
+    normalised: FloatArray = np.abs(residual) / np.sqrt(1.0 + a**2 + (1.0 - a) ** 2)
+    return float(np.quantile(normalised, 0.25)) / _Q25
 
 
 def speed_scale(time: FloatArray, z: FloatArray, span: int = 10) -> float:
@@ -107,7 +116,7 @@ def estimate_noise(
     Parameters
     ----------
     observations
-        A sample of the log; the first few thousand rows are used, evenly thinned per sensor.
+        The log; a few thousand rows in blocks spread over it are used.
     given
         Figures that are known; their length tells how many sensors there are.
     order, period
@@ -158,23 +167,37 @@ def estimate_noise(
 
 
 def _thin(observations: Observations) -> Observations:
-    """At most a few thousand rows: the head of the slowest sensor, the others thinned to match."""
-    present = np.isfinite(observations.z).any(axis=1)
+    """Keep a few thousand rows: blocks of neighbours, evenly spread over the log.
+
+    The blocks are as long as the slowest sensor needs; faster sensors are thinned within them.
+    """
+    present: BoolArray = np.isfinite(observations.z).any(axis=1)
     sensors, counts = np.unique(observations.sensor[present], return_counts=True)
-    if not len(sensors):
-        return Observations(*(field[:0] for field in observations))
-    each = _SAMPLE // len(sensors)
-    until = np.inf
-    for sensor, count in zip(sensors, counts, strict=True):
-        if count > each and count == counts.min():
-            until = observations.time[present & (observations.sensor == sensor)][each]
-    keep = np.zeros(len(present), bool)
-    for sensor in sensors:
-        rows = np.flatnonzero(
-            present & (observations.sensor == sensor) & (observations.time <= until)
-        )
-        keep[rows[:: -(-len(rows) // each)] if len(rows) > 2 * each else rows] = True
-    return Observations(*(field[keep] for field in observations))
+    keep = np.zeros(len(present), dtype=np.bool_)
+    if len(sensors):
+        each = _SAMPLE // len(sensors)
+        slow = sensors[int(np.argmin(counts))]
+        slowest = np.flatnonzero(present & (observations.sensor == slow))
+        spans = _blocks(slowest, each)
+        for sensor in sensors:
+            rows = np.flatnonzero(present & (observations.sensor == sensor))
+            rows = np.concatenate([rows[(rows >= a) & (rows <= b)] for a, b in spans])
+            keep[rows[:: max(1, len(rows) // each)]] = True
+    return Observations(
+        observations.time[keep],
+        observations.z[keep],
+        observations.sensor[keep],
+        observations.declared[keep],
+    )
+
+
+def _blocks(rows: IntArray, size: int) -> list[tuple[int, int]]:
+    """First and last row of the blocks that hold about ``size`` of the given rows."""
+    if len(rows) <= size:
+        return [(int(rows[0]), int(rows[-1]))]
+    length = size // _BLOCKS
+    starts = np.linspace(0, len(rows) - length, _BLOCKS).astype(int)
+    return [(int(rows[s]), int(rows[s + length - 1])) for s in starts]
 
 
 def _initial(sample: Observations, given: FloatArray, columns: slice, period: float) -> FloatArray:
@@ -203,7 +226,7 @@ def _reference_process(sample: Observations, position: FloatArray, order: int) -
     step = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else 1.0
     seen = position[np.isfinite(position)]
     sigma = float(seen.min()) if len(seen) else 1.0
-    return sigma / step ** (order - 0.5)
+    return float(sigma / step ** (order - 0.5))
 
 
 def variances(observations: Observations, figures: NoiseFigures) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["Epochs", "Filtered", "Motion", "Recovery", "TrackState"]
+__all__ = ["Epochs", "Estimate", "Filtered", "Motion", "Recovery", "TrackState"]
 
 
 class Motion(NamedTuple):
@@ -129,5 +129,30 @@ class Filtered(NamedTuple):
     standardised: FloatArray
     nis: FloatArray
     logdet: FloatArray
+    jump: IntArray
+    since: FloatArray
+
+
+class Estimate(NamedTuple):
+    """What a mode of estimation says of each of n epochs.
+
+    Parameters
+    ----------
+    mean, sigma
+        (n, states) state and its standard deviations.
+    weight, distance
+        (n, groups) weight of each group, and how far it lay from its prediction (real time, lagged)
+        or from what all other data say (offline), as a one-axis equivalent in standard deviations.
+    standardised
+        (n, m) the same per component, signed.
+    jump, since
+        (n,) bit mask of groups that restarted here, and (n, groups) when the run began.
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+    weight: FloatArray
+    distance: FloatArray
+    standardised: FloatArray
     jump: IntArray
     since: FloatArray

@@ -58,17 +58,25 @@ def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filte
 
 
 def smooth_lag(
-    motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered, lag: float
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    filtered: Filtered,
+    last: IntArray,
 ) -> Smoothed:
-    """Smooth every epoch with the ``lag`` seconds of data that follow it, and no more.
+    """Smooth the first epochs of a filtered series, each with its own stretch of the future.
 
-    Arguments as for `smooth`.
+    Parameters
+    ----------
+    motion, recovery, time, filtered
+        As for `smooth`.
+    last
+        (k,), k ≤ n: the last epoch that counts for each of the first k epochs.
     """
-    n, states = filtered.mean.shape
-    out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
-    if n:
+    states = filtered.mean.shape[1]
+    out = Smoothed(np.empty((len(last), states)), np.empty((len(last), states, states)))
+    if len(last):
         back = _backward(motion, recovery, time, filtered)
-        last = np.searchsorted(time, time + lag, side="right") - 1
         _smooth(filtered, back, last, False, out)
     return out
 
@@ -163,7 +171,7 @@ def _smooth(
     filtered: Filtered, back: _Backward, last: IntArray, whole: bool, out: Smoothed
 ) -> None:
     """Smooth epoch k with the data up to epoch ``last[k]``; in one sweep if ``whole``."""
-    epochs, n = filtered.mean.shape
+    epochs, n = out.mean.shape
     x = np.empty(n)
     P = np.empty((n, n))
     W = np.empty((n, n + 1))

@@ -19,7 +19,7 @@ from surefix.filters.track_step import RECENT, VAGUE, run
 from surefix.robust.loss import Loss
 from surefix.types import IntArray
 
-__all__ = ["by_axis", "by_block", "filter_track", "start"]
+__all__ = ["blank", "by_axis", "by_block", "filter_track", "start"]
 
 
 def by_block(axes: int) -> IntArray:
@@ -56,6 +56,22 @@ def start(motion: Motion, recovery: Recovery) -> TrackState:
     )
 
 
+def blank(motion: Motion, n: int) -> Filtered:
+    """Make an empty record of n epochs."""
+    states, m = motion.order * motion.axes, 2 * motion.axes
+    return Filtered(
+        np.empty((n, states)),
+        np.empty((n, states, states)),
+        np.full((n, motion.groups), np.nan),
+        np.full((n, motion.groups), np.nan),
+        np.full((n, m), np.nan),
+        np.full((n, motion.groups), np.nan),
+        np.full((n, motion.groups), np.nan),
+        np.zeros(n, np.int64),
+        np.full((n, motion.groups), np.nan),
+    )
+
+
 def filter_track(
     motion: Motion,
     loss: Loss,
@@ -86,18 +102,7 @@ def filter_track(
         The state after the series, what was found at each epoch, and how many epochs were done
         (all of them, unless a recovery ended the call).
     """
-    n, states, m = len(epochs.time), motion.order * motion.axes, 2 * motion.axes
-    out = Filtered(
-        np.empty((n, states)),
-        np.empty((n, states, states)),
-        np.full((n, motion.groups), np.nan),
-        np.full((n, motion.groups), np.nan),
-        np.full((n, m), np.nan),
-        np.full((n, motion.groups), np.nan),
-        np.full((n, motion.groups), np.nan),
-        np.zeros(n, np.int64),
-        np.full((n, motion.groups), np.nan),
-    )
+    out = blank(motion, len(epochs.time))
     after = TrackState(
         state.time,
         state.mean.copy(),

@@ -22,12 +22,14 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
+import numpy as np
 from scipy.special import chdtri
 
 from surefix.errors import OptionsError
-from surefix.jit import helper
+from surefix.jit import helper, kernel
+from surefix.types import FloatArray
 
-__all__ = ["LOSSES", "Loss", "LossCode", "block_scale", "loss_named", "weight"]
+__all__ = ["LOSSES", "Loss", "LossCode", "block_scale", "loss_named", "weight", "weights"]
 
 
 class LossCode(IntEnum):
@@ -162,3 +164,28 @@ def weight(v: float, code: int, k0: float, k1: float) -> float:
     if code == 5:
         taper *= taper
     return k0 / v * taper
+
+
+@kernel
+def weights(nis: FloatArray, size: int, loss: Loss) -> FloatArray:
+    """Weights of a series of squared Mahalanobis distances over ``size`` axes; NaN stays NaN.
+
+    Parameters
+    ----------
+    nis
+        (n,) squared distances.
+    size
+        How many axes each distance runs over.
+    loss
+        Student-t: ``(ν + m)/(ν + d²)``.
+    """
+    out = np.empty(len(nis))
+    scale = 1.0 if size == 1 else loss.scale2 if size == 2 else loss.scale3
+    for k in range(len(nis)):
+        if np.isnan(nis[k]):
+            out[k] = np.nan
+        elif loss.code == 6:
+            out[k] = (loss.k0 + size) / (loss.k0 + nis[k])
+        else:
+            out[k] = weight(np.sqrt(nis[k]) / scale, loss.code, loss.k0, loss.k1)
+    return out

@@ -1,0 +1,128 @@
+"""The three modes: real time, fixed lag, offline; all made of the same filter steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surefix.filters.records import Epochs, Estimate, Filtered, Motion, Recovery, TrackState
+from surefix.filters.rts import Smoothed, smooth_lag
+from surefix.filters.track import blank, filter_track, start
+from surefix.robust.loss import Loss
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["from_filtered", "from_smoothed", "lagged", "realtime"]
+
+_BLOCK = 5000  # epochs filtered in one call while waiting for a recovery
+
+
+def realtime(
+    motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, state: TrackState
+) -> tuple[TrackState, Estimate]:
+    """Estimate every epoch from the past and itself alone; takes and gives the filter's state."""
+    after, filtered, _ = filter_track(motion, loss, recovery, epochs, state)
+    return after, from_filtered(filtered)
+
+
+def from_filtered(filtered: Filtered) -> Estimate:
+    """Read the filter's own output as an estimate."""
+    return Estimate(
+        filtered.mean,
+        np.sqrt(np.einsum("kij,kij->ki", filtered.factor, filtered.factor)),
+        filtered.weight,
+        filtered.sigma,
+        filtered.standardised,
+        filtered.jump,
+        filtered.since,
+    )
+
+
+def from_smoothed(smoothed: Smoothed, decided: Estimate) -> Estimate:
+    """Put smoothed states in the place of the filter's; verdicts stay as decided."""
+    variance = np.maximum(np.einsum("kii->ki", smoothed.covariance), 0.0)
+    return decided._replace(mean=smoothed.mean, sigma=np.sqrt(variance))
+
+
+def lagged(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, lag: float) -> Estimate:
+    """Estimate every epoch from the past and the ``lag`` seconds that follow it.
+
+    When a run of rejections turns out to be a jump, the epochs from its start are filtered again
+    with the jump dated back; what had left the window by then stays as it was.
+
+    Parameters
+    ----------
+    motion, loss, recovery, epochs
+        As for the filter.
+    lag
+        Seconds ≥ 0.
+    """
+    time, n = epochs.time, len(epochs.time)
+    last = np.searchsorted(time, time + lag, side="right") - 1
+    kept = blank(motion, n)
+    parts: list[Estimate] = []
+    state, head, done = start(motion, recovery), 0, 0
+    while head < n:
+        rows = _rows(epochs, head, min(head + _BLOCK, n))
+        state, out, count = filter_track(motion, loss, recovery, rows, state, until_recovery=True)
+        _write(kept, head, out, count)
+        head += count
+        jumped = kept.jump[head - 1] & ~epochs.jump[head - 1]
+        if not jumped:
+            continue
+        ready = max(int(np.searchsorted(last, head - 1)), done)
+        parts.append(_smoothed(motion, recovery, time, kept, last, done, ready))
+        done = ready
+        begin = max(int(np.searchsorted(time, np.nanmin(kept.since[head - 1]))), done)
+        again = _rows(epochs, begin, head)
+        again = again._replace(jump=again.jump.copy())
+        again.jump[0] |= jumped
+        before = _state_before(motion, recovery, time, kept, begin, state)
+        state, redo, count = filter_track(motion, loss, recovery, again, before)
+        _write(kept, begin, redo, count)
+    parts.append(_smoothed(motion, recovery, time, kept, last, done, n))
+    return Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+
+
+def _rows(epochs: Epochs, first: int, last: int) -> Epochs:
+    return Epochs(*(field[first:last] for field in epochs))  # type: ignore[arg-type]
+
+
+def _cut(filtered: Filtered, first: int, last: int) -> Filtered:
+    return Filtered(*(field[first:last] for field in filtered))  # type: ignore[arg-type]
+
+
+def _write(kept: Filtered, at: int, out: Filtered, count: int) -> None:
+    for whole, part in zip(kept, out, strict=True):
+        whole[at : at + count] = part[:count]
+
+
+def _smoothed(
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    kept: Filtered,
+    last: IntArray,
+    first: int,
+    until: int,
+) -> Estimate:
+    """Smoothed estimates of the epochs ``first`` … ``until`` − 1."""
+    end = int(last[until - 1]) + 1 if until > first else first
+    stretch = _cut(kept, first, end)
+    ends = last[first:until] - first
+    smoothed = smooth_lag(motion, recovery, time[first:end], stretch, ends)
+    return from_smoothed(smoothed, from_filtered(_cut(kept, first, until)))
+
+
+def _state_before(
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    kept: Filtered,
+    begin: int,
+    now: TrackState,
+) -> TrackState:
+    """The filter's state just before epoch ``begin``, from what it kept."""
+    if begin == 0:
+        return start(motion, recovery)
+    return now._replace(
+        time=float(time[begin - 1]), mean=kept.mean[begin - 1], factor=kept.factor[begin - 1]
+    )
