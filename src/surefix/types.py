@@ -178,6 +178,8 @@ class Log:
     events: tuple[Event, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     """Records met by kind (sentence type, row); for `surefix info`."""
+    depth_positive_down: bool = False
+    """True where the third axis was given as a depth (height = −depth)."""
 
 
 class Reason(IntEnum):
