@@ -1,0 +1,210 @@
+"""Fixes that say nothing new: the same record again, an old fix polled again, an idle axis.
+
+A sensor that is polled faster than it measures hands out its last fix again and again; to a filter
+each copy looks like an independent confirmation. But a position may also repeat because its digits
+are coarse and the vessel hardly moves, and then every repetition is a measurement. The two are told
+apart by the *grain* of a sensor, the smallest step its digits ever make: where successive positions
+differ by many grains, equality is no coincidence.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from surefix.types import BoolArray, FloatArray, IntArray
+
+__all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "start_repeats"]
+
+_GRAINS = 4.0  # a hold is believed where positions usually change by at least so many grains
+_CHANGES = 5  # the latest changes, whose median counts
+_IDLE_MIN = 10  # fixes that show an axis to be idle
+
+
+class _Sensor(NamedTuple):
+    """One sensor's past: its grain, latest changes in grains, last position, rows of last time."""
+
+    grain: FloatArray
+    changes: FloatArray
+    position: FloatArray
+    since: float
+    epoch: FloatArray
+
+
+class RepeatState(NamedTuple):
+    """What is carried from chunk to chunk, by sensor; made by `start_repeats`."""
+
+    sensors: tuple[_Sensor, ...]
+
+
+class Repeats(NamedTuple):
+    """Which rows say nothing new.
+
+    Parameters
+    ----------
+    repeated
+        (n,) the same record again: same sensor, time and fields.
+    held
+        (n,) the same position again at a later time, where coarse digits do not explain it.
+    first
+        (n,) time of the first such record, s; NaN elsewhere.
+    """
+
+    repeated: BoolArray
+    held: BoolArray
+    first: FloatArray
+
+
+def start_repeats(position: FloatArray, sensor: IntArray, sensors: int) -> RepeatState:
+    """Learn the grain of each sensor from a head of the log.
+
+    Parameters
+    ----------
+    position
+        (n, d) positions as recorded, in the units of their digits; NaN where missing.
+    sensor
+        (n,) sensor indices.
+    sensors
+        Number of sensors. One that does not occur in the head is never taken to hold its fixes.
+    """
+    return RepeatState(tuple(_learn(position[sensor == index]) for index in range(sensors)))
+
+
+def find_repeats(
+    time: FloatArray, fields: FloatArray, sensor: IntArray, state: RepeatState
+) -> tuple[Repeats, RepeatState]:
+    """Find the rows that say nothing new; the result does not depend on the chunks.
+
+    Parameters
+    ----------
+    time
+        (n,) s, in order; rows whose time is NaN are left out.
+    fields
+        (n, m) all that a record says beside its time and sensor, NaN where missing; the first d
+        columns are the position as `start_repeats` got it.
+    sensor
+        (n,) sensor indices.
+    state
+        From `start_repeats` or the call before.
+    """
+    count = time.size
+    no = np.zeros(count, dtype=np.bool_)
+    repeats = Repeats(no, no.copy(), np.full(count, np.nan))
+    after = []
+    for index, past in enumerate(state.sensors):
+        rows = np.flatnonzero((sensor == index) & np.isfinite(time))
+        if not rows.size:
+            after.append(past)
+            continue
+        repeated, epoch = _same_record(time[rows], fields[rows], past.epoch)
+        repeats.repeated[rows] = repeated
+        repeats.first[rows[repeated]] = time[rows[repeated]]
+        new = rows[~repeated]
+        held, since, known = _same_position(time[new], fields[new], past)
+        repeats.held[new] = held
+        repeats.first[new[held]] = since[held]
+        after.append(known._replace(epoch=epoch))
+    return repeats, RepeatState(tuple(after))
+
+
+def constant_axes(position: FloatArray, sensor: IntArray, sensors: int) -> BoolArray:
+    """Find axes that carry no information: constant over a head of the log while others vary.
+
+    Parameters
+    ----------
+    position
+        (n, d) positions of the head; NaN where missing.
+    sensor
+        (n,) sensor indices.
+    sensors
+        Number of sensors.
+
+    Returns
+    -------
+    constant
+        (sensors, d) True where an axis with at least ten values never changes although another
+        axis of the same sensor does.
+    """
+    constant = np.zeros((sensors, position.shape[1]), dtype=np.bool_)
+    for index in range(sensors):
+        own = position[sensor == index]
+        known = np.isfinite(own).sum(axis=0)
+        low = np.min(own, axis=0, initial=np.inf, where=np.isfinite(own))
+        high = np.max(own, axis=0, initial=-np.inf, where=np.isfinite(own))
+        constant[index] = (known >= _IDLE_MIN) & (low == high) & (low < high).any()
+    return constant
+
+
+def _learn(position: FloatArray) -> _Sensor:
+    """Grain of each axis and the usual change, in grains, over the head of one sensor."""
+    axes = position.shape[1]
+    steps = np.abs(np.diff(position[np.isfinite(position).any(axis=1)], axis=0))
+    grain = np.min(steps, axis=0, initial=np.inf, where=steps > 0.0)
+    changes = _in_grains(steps, grain)
+    changes = changes[changes > 0.0]
+    usual = float(np.median(changes)) if changes.size else 0.0
+    blank = np.full(axes, np.nan)
+    return _Sensor(grain, np.full(_CHANGES, usual), blank, np.nan, np.empty((0, 0)))
+
+
+def _in_grains(steps: FloatArray, grain: FloatArray) -> FloatArray:
+    """Size of each step, in grains, along the axis where it is largest; unknown steps count 0."""
+    return np.asarray(np.max(np.where(steps > 0.0, steps / grain, 0.0), axis=1, initial=0.0))
+
+
+def _same_record(
+    time: FloatArray, fields: FloatArray, epoch: FloatArray
+) -> tuple[BoolArray, FloatArray]:
+    """Flag records that repeat an earlier one of the same time; gives the rows of the last time."""
+    if epoch.size and epoch[0, 0] == time[0]:
+        repeated, last = _same_record(
+            np.concatenate((epoch[:, 0], time)),
+            np.concatenate((epoch[:, 1:], fields)),
+            epoch[:0],
+        )
+        return repeated[len(epoch) :], last
+    repeated = np.zeros(time.size, dtype=np.bool_)
+    together = np.diff(time) == 0.0
+    shared = np.flatnonzero(np.append(together, False) | np.insert(together, 0, False))
+    if shared.size:
+        table = np.column_stack((time[shared], fields[shared]))
+        order = np.lexsort(table.T[::-1])
+        repeated[shared[order[1:]]] = _equal(table[order[:-1]], table[order[1:]])
+    latest = np.flatnonzero((time == time[-1]) & ~repeated)
+    return repeated, np.column_stack((time[latest], fields[latest]))
+
+
+def _equal(one: FloatArray, two: FloatArray) -> BoolArray:
+    """Compare rows, a missing value being equal to a missing one."""
+    return np.asarray(((one == two) | (np.isnan(one) & np.isnan(two))).all(axis=1))
+
+
+def _same_position(
+    time: FloatArray, fields: FloatArray, past: _Sensor
+) -> tuple[BoolArray, FloatArray, _Sensor]:
+    """Flag rows that hold the position of an earlier one; gives the time it was first seen."""
+    held, since = np.zeros(time.size, dtype=np.bool_), np.full(time.size, np.nan)
+    rows = np.flatnonzero(np.isfinite(fields[:, : past.grain.size]).any(axis=1))
+    if not rows.size:
+        return held, since, past
+    position = np.vstack((past.position, fields[rows, : past.grain.size]))
+    one, two = position[:-1], position[1:]
+    same = _equal(one, two)
+    begun = np.concatenate(([past.since], time[rows]))
+    run = np.maximum.accumulate(np.where(same, 0, np.arange(1, rows.size + 1)))
+    since[rows] = begun[run]
+
+    compared = ~same & np.isfinite(one).any(axis=1)
+    grains = _in_grains(np.abs(two - one), past.grain)[compared]
+    changes = np.concatenate((past.changes, grains))
+    usual = np.median(sliding_window_view(changes, _CHANGES), axis=1)
+    held[rows] = same & (usual[np.cumsum(compared)] >= _GRAINS)
+    return (
+        held,
+        since,
+        past._replace(
+            changes=changes[-_CHANGES:], position=position[-1], since=float(begun[run[-1]])
+        ),
+    )
