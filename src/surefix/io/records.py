@@ -1,0 +1,146 @@
+"""The columns of the output, in their fixed order, as an Arrow table."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import ArrayLike
+
+from surefix.reasons import texts
+from surefix.types import (
+    AXES,
+    CleanedChannel,
+    FloatArray,
+    IntArray,
+    Reason,
+    Track,
+    Verdict,
+    Verdicts,
+)
+
+__all__ = ["Batch", "Form", "channel_table", "empty", "table"]
+
+_WORDS = np.array([verdict.name.lower() for verdict in Verdict], dtype=object)
+
+
+class Form(NamedTuple):
+    """What an output carries beside the fixed columns.
+
+    Parameters
+    ----------
+    geographic
+        Whether there are latitude and longitude.
+    has_depth
+        Whether the vertical is called ``depth``, positive down, or ``height``.
+    iso
+        Whether times are calendar times (ISO 8601, UTC) or Unix seconds.
+    verdicts
+        Whether there is a verdict, a sensor and a record number beside each epoch.
+    """
+
+    geographic: bool
+    has_depth: bool = False
+    iso: bool = False
+    verdicts: bool = True
+
+
+class Batch(NamedTuple):
+    """Some epochs of a track, and for each the verdict, sensor name and record number of its fix.
+
+    ``coordinates`` (n, 3) are the fixes as they were given: latitude, longitude, height. All but
+    the track are None for a track at times of its own.
+    """
+
+    track: Track
+    verdicts: Verdicts | None = None
+    sensors: tuple[str, ...] = ()
+    sensor: IntArray | None = None
+    row: IntArray | None = None
+    coordinates: FloatArray | None = None
+
+
+def table(batch: Batch, form: Form) -> pa.Table:
+    """Return the columns of a batch; NaN becomes null."""
+    track = batch.track
+    columns: dict[str, pa.Array] = {"time": _time(track.time, form)}
+    for prefix, values in (
+        ("", track.position),
+        ("v", track.velocity),
+        ("sigma_", track.sigma_position),
+    ):
+        columns |= {f"{prefix}{axis}": _floats(values[:, i]) for i, axis in enumerate(AXES)}
+    if batch.verdicts is not None:
+        columns |= _verdicts(batch.verdicts)
+    if form.geographic:
+        unknown = np.full_like(track.position, np.nan)
+        columns |= _globe(unknown if track.geodetic is None else track.geodetic, form)
+    if batch.sensor is not None:
+        names = np.array(batch.sensors, dtype=object)
+        columns["sensor"] = pa.array(names[batch.sensor], pa.string())
+    if batch.row is not None:
+        columns["row"] = pa.array(batch.row, pa.int64())
+    return pa.table(columns)
+
+
+def empty(form: Form) -> pa.Table:
+    """Return the columns of an output without rows: its schema."""
+    none, axes, codes = np.empty(0), np.empty((0, 3)), np.empty(0, dtype=np.int64)
+    track = Track(none, axes, axes, axes, axes, axes)
+    if not form.verdicts:
+        return table(Batch(track), form)
+    verdicts = Verdicts(codes, none, none, axes, codes, none)
+    return table(Batch(track, verdicts, (), codes, codes), form)
+
+
+def channel_table(channel: CleanedChannel, *, iso: bool) -> pa.Table:
+    """Return the columns of a cleaned scalar series; the value goes by the series' name."""
+    return pa.table(
+        {
+            "time": _time(channel.time, Form(False, iso=iso)),
+            channel.name: _floats(channel.value),
+            "raw": _floats(channel.raw),
+            "rate": _floats(channel.rate),
+            "sigma": _floats(channel.sigma),
+            **_verdicts(channel.verdicts),
+        }
+    )
+
+
+def _floats(values: ArrayLike) -> pa.Array:
+    return pa.array(np.ascontiguousarray(values), pa.float64(), from_pandas=True)
+
+
+def _time(time: FloatArray, form: Form) -> pa.Array:
+    if not form.iso:
+        return _floats(time)
+    known = np.isfinite(time)
+    ticks = np.round(np.where(known, time, 0.0) * 1e6).astype(np.int64)
+    return pa.array(ticks, pa.int64(), mask=~known).cast(pa.timestamp("us", tz="UTC"))
+
+
+def _verdicts(verdicts: Verdicts) -> dict[str, pa.Array]:
+    return {
+        "verdict": pa.array(_WORDS[verdicts.verdict], pa.string()),
+        "weight": _floats(verdicts.weight),
+        "innovation_sigma": _floats(verdicts.innovation_sigma),
+        "reason": pa.array(_reasons(verdicts), pa.string()),
+    }
+
+
+def _reasons(verdicts: Verdicts) -> list[str]:
+    """Put the verdicts into words; those that agree, nearly all, share one text."""
+    agrees = verdicts.reason == Reason.AGREES
+    others = Verdicts(*(values[~agrees] for values in verdicts))
+    first = Verdicts(*(values[agrees][:1] for values in verdicts))
+    found = np.empty(len(agrees), dtype=object)
+    found[agrees] = texts(first)[0] if agrees.any() else ""
+    found[~agrees] = texts(others)
+    return list(found)
+
+
+def _globe(geodetic: FloatArray, form: Form) -> dict[str, pa.Array]:
+    height = geodetic[:, 2]
+    vertical = {"depth": _floats(-height)} if form.has_depth else {"height": _floats(height)}
+    return {"lat": _floats(geodetic[:, 0]), "lon": _floats(geodetic[:, 1]), **vertical}
