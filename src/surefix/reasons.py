@@ -15,6 +15,7 @@ _FIXED = {
     Reason.AGREES: "agrees",
     Reason.FIRST: "the track starts here",
     Reason.NO_POSITION: "no position",
+    Reason.NO_VALUE: "no value",
     Reason.NO_TIME: "no time",
     Reason.INVALID: "marked invalid by the sensor",
     Reason.IMPLAUSIBLE: "not a possible position",

@@ -200,6 +200,7 @@ class Reason(IntEnum):
     LATE = 12
     ACCEPTED_BY_USER = 13
     REJECTED_BY_USER = 14
+    NO_VALUE = 15
 
 
 class Verdicts(NamedTuple):

@@ -93,6 +93,17 @@ def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> fl
     return float(np.quantile(normalised, 0.25)) / _Q25
 
 
+def grain(values: FloatArray) -> float:
+    """Resolution of a series: the smallest step between the values that occur.
+
+    >>> grain(np.array([0.3, 0.1, 0.2, 0.4]))
+    0.1
+    """
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    steps = steps[steps > 1e-9]
+    return round(float(steps.min()), 9) if len(steps) > 2 else 0.0
+
+
 def speed_scale(time: FloatArray, z: FloatArray, span: int = 10) -> float:
     """Twice the 90 % quantile of the speed over ``span`` observations along one axis, m/s."""
     span = min(span, len(time) - 1)
@@ -171,7 +182,7 @@ def _thin(observations: Observations) -> Observations:
 
     The blocks are as long as the slowest sensor needs; faster sensors are thinned within them.
     """
-    present: BoolArray = np.isfinite(observations.z).any(axis=1)
+    present = np.asarray(np.any(np.isfinite(observations.z), axis=1))
     sensors, counts = np.unique(observations.sensor[present], return_counts=True)
     keep = np.zeros(len(present), dtype=np.bool_)
     if len(sensors):

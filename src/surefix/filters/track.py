@@ -22,13 +22,23 @@ from surefix.types import IntArray
 __all__ = ["blank", "by_axis", "by_block", "filter_track", "start"]
 
 
-def by_block(axes: int) -> IntArray:
-    """Groups in which both horizontal axes share a weight and the vertical has its own.
+def by_block(axes: tuple[int, ...]) -> IntArray:
+    """Groups in which the horizontal axes share a weight and the vertical has its own.
 
-    >>> by_block(3)
+    Parameters
+    ----------
+    axes
+        Which of x (0), y (1), z (2) the filter runs on.
+
+    >>> by_block((0, 1, 2))
     array([0, 0, 1, 2, 2, 3])
+    >>> by_block((2,))
+    array([0, 1])
     """
-    return np.array({1: [0, 1], 2: [0, 0, 1, 1], 3: [0, 0, 1, 2, 2, 3]}[axes])
+    kinds = [axis == 2 for axis in axes]
+    names = list(dict.fromkeys(kinds))
+    position = np.array([names.index(kind) for kind in kinds])
+    return np.concatenate([position, position + len(names)])
 
 
 def by_axis(axes: int) -> IntArray:

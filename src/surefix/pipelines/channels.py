@@ -1,0 +1,168 @@
+"""Scalar series beside the position, cleaned by the same filter on one axis."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.cleaning.clock import ClockState, repair
+from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
+from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
+from surefix.filters.records import Epochs, Motion, Recovery, TrackState
+from surefix.filters.track import by_block, start
+from surefix.geo.angle import wrap
+from surefix.models.motion import MODELS
+from surefix.pipelines.judge import blank_status, estimate, verdicts
+from surefix.pipelines.options import CleanOptions
+from surefix.types import (
+    Channel,
+    CleanedChannel,
+    FloatArray,
+    Noise,
+    Reason,
+    Verdict,
+)
+
+__all__ = ["ChannelState", "clean_channel"]
+
+_RECOVERY_VALUES = 30
+_LAG_VALUES = 20
+_UNKNOWN = 1e5  # a standard deviation from here on means that nothing is known
+
+
+class ChannelState(NamedTuple):
+    """Where the cleaning of one series stands; ``ChannelState()`` begins it."""
+
+    clock: ClockState = ClockState()
+    held: Channel | None = None
+    repeats: RepeatState | None = None
+    motion: Motion | None = None
+    recovery: Recovery = Recovery(np.inf, 1.0)
+    lag: float = 0.0
+    sigma: float = 1.0
+    noise: tuple[Noise, ...] = ()
+    filter: TrackState | None = None
+
+
+def clean_channel(
+    new: Channel, state: ChannelState, options: CleanOptions, *, final: bool
+) -> tuple[CleanedChannel, ChannelState]:
+    """Clean the next part of a series.
+
+    Parameters
+    ----------
+    new
+        The part, in the order of arrival; may be empty.
+    state
+        From the part before. The first part is the head on which noise is estimated.
+    options
+        Mode and method; noise figures of positions do not apply.
+    final
+        True with the last part.
+    """
+    time, value = new.time, new.value
+    if state.held is not None:
+        time = np.concatenate([state.held.time, time])
+        value = np.concatenate([state.held.value, value])
+    place = np.full((len(new.time), 2), np.nan)
+    row = np.zeros(len(new.time), np.int64)
+    repaired, clock, _ = repair(
+        new.time, place, row, state.clock, final=final, window=options.reorder_s
+    )
+    held = new._replace(time=time[repaired.held], value=value[repaired.held])
+    raw, tau = value[repaired.order], _filled(repaired.tau)
+    state = state._replace(clock=clock, held=held)
+    sensor = np.zeros(len(raw), np.int64)
+    if state.repeats is None:
+        state = state._replace(repeats=start_repeats(raw[:, None], sensor, 1))
+    assert state.repeats is not None
+    found, repeats = find_repeats(repaired.tau, raw[:, None], sensor, state.repeats)
+    state = state._replace(repeats=repeats)
+    status = blank_status(len(raw))
+    status.mark(np.isnan(repaired.tau), Verdict.MISSING, Reason.NO_TIME)
+    status.mark(repaired.late, Verdict.REJECTED, Reason.LATE)
+    status.mark(~np.isfinite(raw), Verdict.MISSING, Reason.NO_VALUE)
+    status.mark(found.repeated, Verdict.DUPLICATE, Reason.REPEATED)
+    status.mark(found.held & options.held, Verdict.DUPLICATE, Reason.HELD)
+    status.detail[status.verdict == Verdict.DUPLICATE] = found.first[
+        status.verdict == Verdict.DUPLICATE
+    ]
+    z = np.where(status.verdict < 0, raw, np.nan)
+    if state.motion is None:
+        state = _settle(state, new, tau, z, options)
+    assert state.motion is not None
+    assert state.filter is not None
+    n = len(raw)
+    epochs = Epochs(
+        tau,
+        np.column_stack([z, np.full(n, np.nan)]),
+        np.full((n, 2), state.sigma**2),
+        np.full((n, 2), np.nan),
+        np.zeros(n, np.int64),
+    )
+    after, estimated = estimate(
+        options, state.motion, state.recovery, state.lag, epochs, state.filter
+    )
+    judged = verdicts(estimated, epochs, state.motion, status, options.loss.code)
+    known = estimated.sigma[:, 0] < _UNKNOWN
+    mean = np.where(known, estimated.mean[:, 0], np.nan)
+    cleaned = CleanedChannel(
+        name=new.name,
+        sensor=new.sensor,
+        time=repaired.time,
+        raw=raw,
+        value=wrap(mean - 180.0) + 180.0 if new.period == 360.0 else mean,
+        rate=np.where(known, estimated.mean[:, 1], np.nan),
+        sigma=np.where(known, estimated.sigma[:, 0], np.nan),
+        period=new.period,
+        verdicts=judged,
+        noise=state.noise,
+    )
+    return cleaned, state._replace(filter=after)
+
+
+def _filled(tau: FloatArray) -> FloatArray:
+    """``tau`` without gaps and never falling, for rows that only take a prediction."""
+    filled = np.maximum.accumulate(np.where(np.isfinite(tau), tau, -np.inf))
+    finite = filled[np.isfinite(filled)]
+    return np.where(np.isfinite(filled), filled, finite[0] if len(finite) else 0.0)
+
+
+def _settle(
+    state: ChannelState, new: Channel, tau: FloatArray, z: FloatArray, options: CleanOptions
+) -> ChannelState:
+    """Estimate the noise of a series on its head and start its filter."""
+    seen = np.isfinite(z)
+    order = MODELS[options.model]
+    values = np.column_stack([z[seen], np.full(seen.sum(), np.nan)])
+    observations = Observations(
+        tau[seen], values, np.zeros(seen.sum(), np.int64), np.full_like(values, np.nan)
+    )
+    unknown = NoiseFigures(np.array([np.nan]), np.array([np.nan]), np.nan)
+    figures = estimate_noise(
+        observations, unknown, order=order, period=new.period, quantum=grain(z[seen])
+    )
+    steps = np.diff(tau[seen])
+    steps = steps[steps > 0.0]
+    interval = float(np.median(steps)) if len(steps) else 1.0
+    turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
+    motion = Motion(order, 1, np.array([figures.process**2]), by_block((0,)), 2, new.period)
+    recovery = Recovery(
+        float(options.recovery_s or _RECOVERY_VALUES * interval),
+        max(speed_scale(tau[seen], turned), 1e-6),
+    )
+    unit = new.name.rsplit("_", 1)[-1]
+    sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
+    noise = (
+        Noise(new.sensor, new.name, sigma, unit, "estimated"),
+        Noise("motion", f"{new.name} change", figures.process, f"{unit}/s^1.5", "estimated"),
+    )
+    return state._replace(
+        motion=motion,
+        recovery=recovery,
+        lag=float(options.lag_s or _LAG_VALUES * interval),
+        sigma=sigma,
+        noise=noise,
+        filter=start(motion, recovery),
+    )

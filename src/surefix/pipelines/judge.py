@@ -1,0 +1,126 @@
+"""From what the filter decided to one verdict with its reason per row."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.filters.modes import lagged, realtime
+from surefix.filters.offline import offline
+from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
+from surefix.pipelines.options import CleanOptions
+from surefix.robust.loss import LossCode
+from surefix.types import FloatArray, IntArray, Reason, Verdict, Verdicts
+
+__all__ = ["Status", "estimate", "verdicts"]
+
+_WHOLE = 0.98  # a weight from here on counts as used
+_NONE = 0.02  # a weight up to here counts as rejected
+
+
+class Status(NamedTuple):
+    """What is known of a row before any filter sees it.
+
+    Parameters
+    ----------
+    verdict
+        (n,) code of `Verdict`, −1 where the filter decides.
+    reason
+        (n,) code of `Reason`.
+    detail
+        (n,) figure that goes with it.
+    """
+
+    verdict: IntArray
+    reason: IntArray
+    detail: FloatArray
+
+    def mark(self, where: FloatArray | IntArray, verdict: Verdict, reason: Reason) -> None:
+        """Set verdict and reason of the rows that have none yet."""
+        rows = np.asarray(where, dtype=np.bool_) & (self.verdict < 0)
+        self.verdict[rows] = verdict
+        self.reason[rows] = reason
+
+
+def blank_status(n: int) -> Status:
+    """Leave every row to the filter."""
+    return Status(np.full(n, -1), np.zeros(n, np.int64), np.full(n, np.nan))
+
+
+def estimate(
+    options: CleanOptions,
+    motion: Motion,
+    recovery: Recovery,
+    lag: float,
+    epochs: Epochs,
+    state: TrackState,
+) -> tuple[TrackState, Estimate]:
+    """Estimate a series in the mode the options ask for; only real time goes on from ``state``."""
+    if options.mode == "realtime":
+        return realtime(motion, options.loss, recovery, epochs, state)
+    if options.mode == "lagged":
+        return state, lagged(motion, options.loss, recovery, epochs, lag)
+    return state, offline(motion, options.loss, recovery, epochs)
+
+
+def verdicts(
+    found: Estimate, epochs: Epochs, motion: Motion, status: Status, code: int
+) -> Verdicts:
+    """Give every row its verdict.
+
+    The weight is the smallest of the position groups that were observed. A fix is rejected where
+    its horizontal position (or its only group) is; a height rejected alone leaves it down-weighted.
+
+    Parameters
+    ----------
+    found, epochs, motion
+        What the filter made of which observations.
+    status
+        What was known before.
+    code
+        The `LossCode` that decided.
+    """
+    n, d = len(epochs.time), motion.axes
+    groups = int(motion.group[:d].max()) + 1
+    weight = np.minimum(found.weight[:, :groups], 1.0)
+    distance = found.distance[:, :groups]
+    smallest = _fold(np.fmin, weight)
+    verdict = np.full(n, int(Verdict.USED))
+    verdict[smallest < _WHOLE] = Verdict.DOWNWEIGHTED
+    leading = weight[:, 0].copy()
+    for g in range(1, groups):
+        leading = np.where(np.isnan(leading), weight[:, g], leading)
+    verdict[leading <= _NONE] = Verdict.REJECTED
+    reason = np.full(n, int(Reason.AGREES))
+    reason[verdict != Verdict.USED] = Reason.OFF
+    detail = np.full(n, np.nan)
+    if groups > 1:
+        low = np.nan_to_num(weight, nan=1.0) < _WHOLE
+        part = low.any(axis=1) & ~low.all(axis=1) & (np.isfinite(weight).sum(axis=1) > 1)
+        reason[part] = Reason.AXIS_OFF
+        detail[part] = (low[part] * (1 << np.arange(groups))).sum(axis=1)
+    since = found.since[:, :groups]
+    jumped = np.isfinite(since).any(axis=1)
+    reason[jumped & (verdict != Verdict.REJECTED)] = Reason.JUMP
+    detail[jumped] = np.nanmin(since[jumped], axis=1)
+    decided = status.verdict >= 0
+    verdict = np.where(decided, status.verdict, verdict)
+    reason = np.where(decided, status.reason, reason)
+    detail = np.where(decided, status.detail, detail)
+    weight_out = np.where(np.isnan(smallest), 0.0, smallest)
+    if code == LossCode.NONE:
+        reason[(reason == Reason.OFF) & (verdict == Verdict.USED)] = Reason.AGREES
+    return Verdicts(
+        verdict.astype(np.int64),
+        weight_out,
+        _fold(np.fmax, distance),
+        found.standardised[:, :d],
+        reason.astype(np.int64),
+        detail,
+    )
+
+
+def _fold(function: np.ufunc, columns: FloatArray) -> FloatArray:
+    """Smallest or largest of the columns, NaN where all are."""
+    return np.asarray(function.reduce(columns, axis=1))

@@ -1,0 +1,128 @@
+"""Options of `surefix clean`: one frozen record, validated once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any, Literal, get_args
+
+from surefix.errors import OptionsError
+from surefix.models.motion import MODELS
+from surefix.robust.loss import LOSSES, Loss, loss_named
+
+__all__ = ["CleanOptions", "Mode", "options_from"]
+
+Mode = Literal["realtime", "lagged", "offline"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CleanOptions:
+    """How a log is cleaned. Every figure left at None is taken from the data and reported.
+
+    Parameters
+    ----------
+    mode
+        ``realtime``: each fix is judged and estimated from the past alone. ``lagged``: from the
+        past and ``lag_s`` seconds of future. ``offline``: from the whole log.
+    method
+        The robust loss, one of `surefix.robust.loss.LOSSES`.
+    model
+        Motion model: ``cv`` constant velocity or ``ca`` constant acceleration.
+    k0, k1
+        Constants of the loss, standard deviations (Student-t: k0 is ν).
+    false_alarm
+        Share of good fixes that ``gate`` may reject.
+    lag_s
+        Seconds of future in the lagged mode; default 20 intervals between fixes.
+    recovery_s
+        Seconds of unbroken rejection after which a track believes its sensor again; default 30
+        intervals between fixes. Runs of errors shorter than this are survived.
+    sigma_position, sigma_height, sigma_velocity
+        Noise of the fixes: horizontal m, vertical m, velocity m/s.
+    sensor_sigma
+        The same for single sensors, by name; wins over the three above.
+    process
+        Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
+    every_s
+        Also give the track at regular times, s apart.
+    reorder_s
+        Rows up to this many seconds out of order are put in their place.
+    held
+        Count a position that is polled again only once.
+    """
+
+    mode: Mode = "offline"
+    method: str = "igg3"
+    model: str = "cv"
+    k0: float | None = None
+    k1: float | None = None
+    false_alarm: float = 0.0027
+    lag_s: float | None = None
+    recovery_s: float | None = None
+    sigma_position: float | None = None
+    sigma_height: float | None = None
+    sigma_velocity: float | None = None
+    sensor_sigma: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    process: float | None = None
+    every_s: float | None = None
+    reorder_s: float = 10.0
+    held: bool = True
+
+    def __post_init__(self) -> None:
+        if self.mode not in get_args(Mode):
+            raise OptionsError(f"mode {self.mode!r}", "one of " + ", ".join(get_args(Mode)))
+        if self.method not in LOSSES:
+            raise OptionsError(f"method {self.method!r}", "one of " + ", ".join(LOSSES))
+        if self.model not in MODELS:
+            raise OptionsError(f"model {self.model!r}", "one of " + ", ".join(MODELS))
+        figures = {f.name: getattr(self, f.name) for f in fields(self)}
+        figures |= {f"sigma of sensor {name!r}": v for name, v in self.sensor_sigma.items()}
+        for name in _POSITIVE:
+            _positive(name, figures[name])
+        for name, value in self.sensor_sigma.items():
+            _positive(f"sigma of sensor {name!r}", value)
+        if not (math.isfinite(self.reorder_s) and self.reorder_s >= 0.0):
+            raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
+        self.loss  # noqa: B018  # refuses constants that do not fit the method
+
+    @property
+    def loss(self) -> Loss:
+        """The robust loss these options ask for."""
+        return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
+
+
+_POSITIVE = (
+    "lag_s",
+    "recovery_s",
+    "sigma_position",
+    "sigma_height",
+    "sigma_velocity",
+    "process",
+    "every_s",
+)
+
+
+def _positive(name: str, value: object) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise OptionsError(f"{name} = {value!r}", "a number")
+    if not (math.isfinite(value) and value > 0.0):
+        raise OptionsError(f"{name} = {value}", "a finite number above zero")
+
+
+def options_from(table: Mapping[str, Any]) -> CleanOptions:
+    """Make options from a mapping of names, such as a table of a TOML file.
+
+    Raises
+    ------
+    OptionsError
+        An unknown name (the message lists the known ones) or an impossible value.
+    """
+    known = {f.name for f in fields(CleanOptions)}
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise OptionsError(f"option {unknown[0]!r}", "one of " + ", ".join(sorted(known)))
+    return CleanOptions(**table)

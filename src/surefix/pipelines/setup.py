@@ -1,0 +1,255 @@
+"""What is settled once, on the head of a log: frame, axes, noise, recovery."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
+from surefix.filters.records import Motion, Recovery
+from surefix.filters.track import by_block
+from surefix.geo.local_frame import LocalFrame, origin_of, rotate
+from surefix.models.motion import MODELS
+from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.rows import Rows
+from surefix.types import BoolArray, Event, FloatArray, Noise
+
+__all__ = ["Setup", "localise", "settle"]
+
+_LAG_FIXES = 20
+_RECOVERY_FIXES = 30
+_DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
+_PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """How the rows of one log are turned into a track.
+
+    Parameters
+    ----------
+    frame
+        Local frame of geographic input, else None.
+    origin
+        (3,) m subtracted from metric input, so that the filter works on small numbers.
+    axes
+        Which of x, y, z are observed.
+    motion, recovery
+        Of the filter; the groups are horizontal and vertical blocks.
+    interval
+        Median interval between fixes, s.
+    lag
+        Seconds of future in the lagged mode.
+    position, velocity
+        (sensors, 3) standard deviations used where the records declare none.
+    height_offset
+        (sensors,) m subtracted from the heights of a sensor to agree with the depth sensor.
+    noise, events
+        The same for people.
+    """
+
+    frame: LocalFrame | None
+    origin: FloatArray
+    axes: tuple[int, ...]
+    motion: Motion
+    recovery: Recovery
+    interval: float
+    lag: float
+    position: FloatArray
+    velocity: FloatArray
+    height_offset: FloatArray
+    noise: tuple[Noise, ...]
+    events: tuple[Event, ...]
+
+
+def localise(
+    rows: Rows, frame: LocalFrame | None, origin: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Position (n, 3) and velocity (n, 3) of rows in the local axes."""
+    position, velocity = rows.fixes.position - origin, rows.fixes.velocity.copy()
+    if frame is not None and rows.fixes.geographic:
+        x, y, convergence = frame.to_local(rows.fixes.position[:, 0], rows.fixes.position[:, 1])
+        position[:, 0], position[:, 1] = x, y
+        turn = np.nan_to_num(convergence)
+        velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], turn)
+    return position, velocity
+
+
+def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOptions) -> Setup:
+    """Settle frame, axes and noise on the head of a log.
+
+    Parameters
+    ----------
+    rows
+        The head; the whole log where the mode allows it.
+    usable
+        (n,) rows that may be learnt from: neither late nor repeated nor marked invalid.
+    sensors
+        Names of the sensors.
+    options
+        Figures given there win over estimates.
+    """
+    frame, origin = _frame(rows, usable)
+    position, velocity = localise(rows, frame, origin)
+    position[~usable], velocity[~usable] = np.nan, np.nan
+    offset, offset_events = _height_offsets(rows, position, sensors)
+    position[:, 2] -= np.where(rows.auxiliary, 0.0, offset[rows.fixes.sensor])
+    axes = tuple(i for i in range(3) if np.isfinite(position[:, i]).any())
+    interval = _interval(rows, position)
+    sigma_position, sigma_velocity, density, noise = _noise(
+        rows, position, velocity, axes, sensors, options
+    )
+    group = by_block(axes)
+    speeds = [_speed(rows, position, i) for i in axes]
+    after = options.recovery_s or _RECOVERY_FIXES * interval
+    return Setup(
+        frame=frame,
+        origin=origin,
+        axes=axes,
+        motion=Motion(
+            MODELS[options.model], len(axes), density, group, int(group.max(initial=-1)) + 1, 0.0
+        ),
+        recovery=Recovery(float(after), max([*speeds, 1e-3])),
+        interval=interval,
+        lag=float(options.lag_s or _LAG_FIXES * interval),
+        position=sigma_position,
+        velocity=sigma_velocity,
+        height_offset=offset,
+        noise=noise,
+        events=offset_events,
+    )
+
+
+def _frame(rows: Rows, usable: BoolArray) -> tuple[LocalFrame | None, FloatArray]:
+    seen = rows.fixes.position[usable & ~rows.auxiliary]
+    if rows.fixes.geographic:
+        return origin_of(seen[:, 0], seen[:, 1]), np.zeros(3)
+    origin = np.zeros(3)
+    for i in range(3):
+        values = seen[np.isfinite(seen[:, i]), i]
+        origin[i] = np.round(np.median(values)) if len(values) else 0.0
+    return None, origin
+
+
+def _height_offsets(
+    rows: Rows, position: FloatArray, sensors: list[str]
+) -> tuple[FloatArray, tuple[Event, ...]]:
+    """Median difference of each sensor's height from the depth sensor's, where there is one."""
+    offset = np.zeros(len(sensors))
+    events = []
+    depth = rows.auxiliary & np.isfinite(position[:, 2])
+    if not depth.any():
+        return offset, ()
+    for sensor in np.unique(rows.fixes.sensor[~rows.auxiliary]).tolist():
+        mine = ~rows.auxiliary & (rows.fixes.sensor == sensor) & np.isfinite(position[:, 2])
+        if mine.sum() < 3:
+            continue
+        reference = np.interp(rows.tau[mine], rows.tau[depth], position[depth, 2])
+        differences = position[mine, 2] - reference
+        middle = float(np.median(differences))
+        spread = 1.4826 * float(np.median(np.abs(differences - middle)))
+        if abs(middle) > _DISAGREE * spread / np.sqrt(mine.sum()):
+            offset[sensor] = middle
+            text = (
+                f"the height of {sensors[sensor]} lies {middle:+.2f} m from the depth sensor's; "
+                "subtracted"
+            )
+            events.append(Event("height-offset", np.nan, text))
+    return offset, tuple(events)
+
+
+def _interval(rows: Rows, position: FloatArray) -> float:
+    """Median interval between fixes with a position, s; 1 where there are too few."""
+    seen = ~rows.auxiliary & np.isfinite(position).any(axis=1) & np.isfinite(rows.tau)
+    steps = np.diff(rows.tau[seen])
+    steps = steps[steps > 0.0]
+    return float(np.median(steps)) if len(steps) else 1.0
+
+
+def _speed(rows: Rows, position: FloatArray, axis: int) -> float:
+    seen = np.isfinite(position[:, axis]) & np.isfinite(rows.tau)
+    if rows.auxiliary[seen].any() and (~rows.auxiliary[seen]).any():
+        seen &= ~rows.auxiliary
+    return speed_scale(rows.tau[seen], position[seen, axis])
+
+
+def _noise(
+    rows: Rows,
+    position: FloatArray,
+    velocity: FloatArray,
+    axes: tuple[int, ...],
+    sensors: list[str],
+    options: CleanOptions,
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[Noise, ...]]:
+    """Noise of every sensor on the horizontal and the vertical block, given or estimated."""
+    sigma_position = np.full((len(sensors), 3), np.nan)
+    sigma_velocity = np.full((len(sensors), 3), np.nan)
+    density = np.zeros(len(axes))
+    noise: list[Noise] = []
+    for vertical in (False, True):
+        block = [i for i in axes if (i == 2) == vertical]
+        if not block:
+            continue
+        declared = np.hstack(
+            [rows.fixes.sigma_position[:, block], rows.fixes.sigma_velocity[:, block]]
+        )
+        z = np.hstack([position[:, block], velocity[:, block]])
+        known = np.isfinite(rows.tau) & np.isfinite(z).any(axis=1)
+        observations = Observations(
+            rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
+        )
+        given = _given(options, sensors, rows, vertical)
+        found = estimate_noise(
+            observations, given, order=MODELS[options.model], quantum=grain(z[known, 0])
+        )
+        sigma_position[:, block] = found.position[:, None]
+        sigma_velocity[:, block] = found.velocity[:, None]
+        density[[axes.index(i) for i in block]] = found.process**2
+        noise += _named(found, given, sensors, vertical, options.model, observations)
+    return sigma_position, sigma_velocity, density, tuple(noise)
+
+
+def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:
+    """The user's figures per sensor; NaN where there is none."""
+    auxiliary = set(np.unique(rows.fixes.sensor[rows.auxiliary]).tolist())
+    general = options.sigma_height if vertical else options.sigma_position
+    position = np.array(
+        [
+            options.sensor_sigma.get(name, (None if i in auxiliary else general) or np.nan)
+            for i, name in enumerate(sensors)
+        ]
+    )
+    velocity = np.full(len(sensors), options.sigma_velocity or np.nan)
+    return NoiseFigures(position, velocity, options.process or np.nan)
+
+
+def _named(
+    found: NoiseFigures,
+    given: NoiseFigures,
+    sensors: list[str],
+    vertical: bool,
+    model: str,
+    observations: Observations,
+) -> list[Noise]:
+    axes = observations.z.shape[1] // 2
+    words = ("height", "vertical velocity") if vertical else ("position", "velocity")
+    out = []
+    for sensor, name in enumerate(sensors):
+        rows = observations.sensor == sensor
+        for word, value, fixed, part in (
+            (words[0], found.position[sensor], given.position[sensor], slice(0, axes)),
+            (words[1], found.velocity[sensor], given.velocity[sensor], slice(axes, None)),
+        ):
+            if not np.isfinite(value) or not np.isfinite(observations.z[rows, part]).any():
+                continue
+            declared = observations.declared[rows, part]
+            source = "given" if np.isfinite(fixed) else "estimated"
+            if np.isfinite(declared).any():
+                value, source = np.nanmedian(declared), "declared"
+            unit = "m" if part.start == 0 else "m/s"
+            out.append(Noise(name, word, float(value), unit, source))
+    word = "vertical acceleration" if vertical else "acceleration"
+    word = word.replace("acceleration", "jerk") if model == "ca" else word
+    source = "given" if np.isfinite(given.process) else "estimated"
+    return [*out, Noise("motion", word, found.process, _PROCESS_UNIT[model], source)]
