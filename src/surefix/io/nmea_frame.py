@@ -130,7 +130,7 @@ def _shorten(frames: list[Frame], number: int, line: bytes) -> tuple[bytes, bool
 
 def _add(frames: list[Frame], number: int, line: bytes) -> None:
     """Frames of one line, at once if it ends with its only sentence, else piece by piece."""
-    if line[-3:-2] == b"*":
+    if line.find(b"*") == len(line) - 3 >= 0:
         at = line.rfind(b"$")
         if at == line.find(b"$") >= 0 and line.find(b"!") < 0 and _SENTENCE.match(line, at):
             frames.append(Frame(number, line[:at].strip(_BLANK) if at else b"", line[at:], None))

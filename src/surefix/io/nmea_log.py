@@ -51,13 +51,12 @@ def sniff(head: bytes) -> bool:
     end = max(head.rfind(b"\n"), head.rfind(b"\r"))
     state, frames = frame(START, head[: end + 1] if end > 0 else head)
     good = other = 0
-    for _, prefix, text, problem in [*frames, *finish(state)]:
+    for _, _, text, problem in [*frames, *finish(state)]:
         if problem in ("binary", "too-long") or text.startswith(b"#"):
             continue
         known = problem is None and _plausible(text)
-        timed = not prefix or not math.isnan(receive_time(prefix))
         good += known
-        other += not (known and timed)
+        other += not known
     return good > 0 and good >= _SHARE * (good + other)
 
 

@@ -1,0 +1,17 @@
+"""Where the recorded logs are that stand beside the project and are not part of it."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+_BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """Folder of the recorded logs; the test is skipped where they are absent."""
+    folder = Path(os.environ.get("SUREFIX_DATA", _BESIDE))
+    if not folder.is_dir():
+        pytest.skip("no recorded logs: set SUREFIX_DATA to their folder to run this test")
+    return folder
