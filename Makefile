@@ -1,0 +1,64 @@
+# Python 3.11, 3.12 or 3.13 and make are all it takes; everything else goes into .venv beside this
+# file. `make PYTHON=/path/to/python3.12 …` chooses the interpreter.
+
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+CANDIDATES := $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
+KERNELS := build/kernels
+
+.PHONY: help demo test lint format lock clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make demo    install what is needed and run the demonstration'
+	@echo 'make test    check style, types and layers, and run every test'
+	@echo 'make lint    check style, types and layers only'
+	@echo 'make format  put the code into its style'
+	@echo 'make lock    resolve the dependencies anew into requirements.lock'
+	@echo 'make clean   remove what make made'
+
+demo: $(INSTALLED)
+	$(BIN)/surefix demo
+
+# Kernels are compiled afresh: a cached caller can outlive the kernel it calls.
+test: lint
+	rm -rf $(KERNELS)
+	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m pytest -n 2
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(INSTALLED)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: $(INSTALLED)
+	$(BIN)/python -m pip install --quiet uv
+	printf 'hatchling\neditables\n' | $(BIN)/uv pip compile --quiet --universal \
+	  --python-version 3.11 --all-extras --group pyproject.toml:dev --generate-hashes --upgrade \
+	  --no-emit-index-url --custom-compile-command 'make lock' \
+	  --output-file requirements.lock pyproject.toml -
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+
+$(INSTALLED): requirements.lock pyproject.toml
+	@found=; for python in $(CANDIDATES); do \
+	  if $$python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
+	    >/dev/null 2>&1; then found=$$python; break; fi; done; \
+	if [ -z "$$found" ]; then \
+	  echo 'surefix needs Python 3.11, 3.12 or 3.13 and found none as: $(CANDIDATES).' >&2; \
+	  echo 'Install one, or name it: make PYTHON=/path/to/python3.12 demo' >&2; exit 1; fi; \
+	echo "Creating $(VENV) with $$($$found --version)"; \
+	$$found -m venv $(VENV) || { \
+	  echo 'The venv module is missing; on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
+	@echo 'Installing the locked dependencies (a few minutes the first time)'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	  --requirement requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation \
+	  --no-deps --editable .
+	@touch $@
