@@ -12,8 +12,9 @@ import gzip
 import re
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, cast
+from typing import NamedTuple
 
 import pyarrow as pa
 import pyarrow.csv as pacsv
@@ -32,6 +33,9 @@ _DECIMAL_POINT = re.compile(r"^[+-]?\d*\.\d+$")
 _DATE = re.compile(r"^\d{4}-\d\d-\d\d")
 _WORDS = ("nan", "null", "na", "n/a", "none")
 _NULLS = ["", "-", "--", "--.--", "NaN", *_WORDS, *(word.upper() for word in _WORDS)]
+
+
+_Stream = BufferedReader | gzip.GzipFile
 
 
 class Dialect(NamedTuple):
@@ -90,7 +94,7 @@ class Rows(NamedTuple):
     example: str
 
 
-def _open(path: Path) -> tuple[BinaryIO, BinaryIO]:
+def _open(path: Path) -> tuple[BufferedReader, _Stream]:
     """Open the file and, where it is packed, the text inside; both may be the same."""
     try:
         raw = path.open("rb")
@@ -102,15 +106,15 @@ def _open(path: Path) -> tuple[BinaryIO, BinaryIO]:
             f"{path}: {reason}", "a file that can be read", "check the path"
         ) from error
     packed = raw.peek(2)[:2] == b"\x1f\x8b"
-    return raw, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if packed else raw
+    return raw, gzip.GzipFile(fileobj=raw) if packed else raw
 
 
-def _read(stream: BinaryIO, size: int) -> tuple[bytes, bool]:
+def _read(stream: _Stream, size: int) -> tuple[bytes, bool]:
     """Read up to size bytes; True with what there is where a gzip stream is damaged."""
     parts: list[bytes] = []
     while size > 0:
         try:
-            part = stream.read(min(size, 1 << 20))
+            part = stream.read1(min(size, 1 << 20))
         except (EOFError, zlib.error, gzip.BadGzipFile):
             return b"".join(parts), True
         if not part:
@@ -137,7 +141,7 @@ def sniff(path: Path) -> Dialect:
         raise InputError(f"{path} is empty", "a table with a header and records")
     if sample[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError(f"{path} is UTF-16 text", "UTF-8 text", "save it as CSV in UTF-8")
-    if b"\0" in sample:
+    if _is_binary(sample):
         raise InputError(
             f"{path} is binary", "a CSV or Parquet table", "export the log as CSV with a header"
         )
@@ -148,6 +152,11 @@ def sniff(path: Path) -> Dialect:
     dialect = _dialect(path, [_decoded(line).rstrip("\r") for line in raw_lines], old_mac)
     size = sum(len(line) + 1 for line in raw_lines[: dialect.header_lines])
     return dialect._replace(header_bytes=size)
+
+
+def _is_binary(sample: bytes) -> bool:
+    """Whether there are NUL bytes at the top, or many of them; a few are damage further down."""
+    return b"\0" in b"".join(sample.splitlines()[:2])[:1024] or sample.count(0) > len(sample) // 10
 
 
 def _decoded(line: bytes) -> str:
