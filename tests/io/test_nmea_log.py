@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from surefix.errors import InputError
 from surefix.geo.time import DAY
@@ -350,6 +352,38 @@ def test_rubbish_gives_one_empty_log(tmp_path: Path, content: bytes) -> None:
     (log,) = read_nmea(path)
     assert log.fixes is None
     assert sum(problem.total for problem in log.problems) < 3
+
+
+PIECES = [
+    *map(line, [gga("235959"), gga("000000", "GN"), rmc("000001", "010814"), gll("", "II")]),
+    line("GPZDA,000002,01,08,2014,,"),
+    line("GPGST,000000,1.0,,,,2.0,3.0,4.0"),
+    line("GPVTG,180.0,T,,M,10.0,N,,K"),
+    line("SDDPT,7.0,0.5", "2014-08-01T00:00:00Z "),
+    line(rmc("000001", "161294"), "1406851201 "),
+    "$GPGGA,1200",
+    "\r\n",
+]
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    pieces=st.lists(
+        st.one_of(st.sampled_from([piece.encode() + b"\n" for piece in PIECES]), st.binary())
+    ),
+    chunk=st.integers(1, 5),
+)
+def test_no_mixture_raises(tmp_path: Path, pieces: list[bytes], chunk: int) -> None:
+    path = tmp_path / "mixture"
+    path.write_bytes(b"".join(pieces))
+    sniff(path.read_bytes())
+    numbers: list[int] = []
+    for log in read_nmea(path, require_checksum=False, chunk_fixes=chunk):
+        if log.fixes is not None:
+            numbers += log.fixes.row.tolist()
+            assert log.fixes.sensor.max() < len(log.sensors)
+            assert np.isfinite(log.fixes.position[log.fixes.valid, :2]).all()
+    assert numbers == list(range(len(numbers)))
 
 
 def test_missing_file(tmp_path: Path) -> None:
