@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import needs
 from surefix.cleaning.duplicates import constant_axes, find_repeats, start_repeats
 
 
@@ -142,20 +141,20 @@ def columns(path, *names):
         )
 
 
-def test_real_acoustic_log_polled_at_5_hz():
-    path = needs.data("usbl_ugps_raw") / "2024-12-05_22-12-34_g2_acoustic.csv"
+def test_real_acoustic_log_polled_at_5_hz(data):
+    path = data / "usbl_ugps_raw" / "2024-12-05_22-12-34_g2_acoustic.csv"
     table = columns(path, "timestamp", "x", "y", "z", "std")
     repeated, held, _ = find(table[:, 0], table[:, 1:], axes=3)
     assert not repeated.any()
     assert len(table) - held.sum() == 1724  # the first of them before there was any valid fix
 
 
-def test_real_dive_log_repeats_because_its_digits_are_coarse():
+def test_real_dive_log_repeats_because_its_digits_are_coarse(data):
     """Positions kept as 32-bit floats, 0.4 m apart, which change by one step at a time.
 
     The axes repeat independently of each other, which polling an old fix would not make them do.
     """
-    path = next(needs.data("usbl_ugps_dive").glob("*.csv"))
+    path = next((data / "usbl_ugps_dive").glob("*.csv"))
     place = columns(path, "gps.lat", "gps.lon")
     same = np.diff(place, axis=0) == 0.0
     assert place.shape[0] - same.all(axis=1).sum() == 1536
@@ -164,16 +163,16 @@ def test_real_dive_log_repeats_because_its_digits_are_coarse():
     assert held.sum() < 10  # at bursts of jumps
 
 
-def test_real_survey_with_an_idle_altitude():
-    path = needs.data("usbl_mbari") / "oi_survey_1648_USBL_WINFROG.csv"
+def test_real_survey_with_an_idle_altitude(data):
+    path = data / "usbl_mbari" / "oi_survey_1648_USBL_WINFROG.csv"
     place = columns(path, "latitude", "longitude", "altitude")
     idle = constant_axes(place, np.zeros(len(place), dtype=np.int64), 1)
     assert idle.tolist() == [[False, False, True]]
 
 
-def test_real_yachts_are_not_held_at_their_moorings():
+def test_real_yachts_are_not_held_at_their_moorings(data):
     pattern = re.compile(r"\$..RMC,[^,]*,A,(\d\d)([\d.]+),[NS],(\d{3})([\d.]+),[EW]")
-    for path in sorted(needs.data("ship_yachts").glob("*.TXT")):
+    for path in sorted((data / "ship_yachts").glob("*.TXT")):
         found = pattern.findall(path.read_text(errors="replace"))
         place = np.asarray(found, dtype=float)
         _, held, _ = find(np.arange(len(place)), place[:, ::2] + place[:, 1::2] / 60.0)
