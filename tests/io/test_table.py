@@ -160,6 +160,8 @@ def test_times_of_every_kind(tmp_path: Path) -> None:
         "utc": "2023-11-10T19:13:18.720397Z",
         "Time (UTC)": "2023-11-10 19:13:18.720397",
         "datetime": "2023-11-10T20:13:18.720397+01:00",
+        "Timestamp": "2023/11/10 19:13:18.720397",
+        "t": "20231110T191318.720397",
     }
     for name, cell in texts.items():
         log = read(write(tmp_path, f"{name},x\n{cell},1\n,2\n"))

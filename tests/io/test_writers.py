@@ -21,22 +21,7 @@ from surefix.io.write_csv import escaped
 from surefix.io.writers import SUFFIXES, TrackWriter, track_writer, write_channel, write_track
 from surefix.types import CleanedChannel, Reason, Track, Verdict, Verdicts
 
-FIXED = [
-    "time",
-    "x",
-    "y",
-    "z",
-    "vx",
-    "vy",
-    "vz",
-    "sigma_x",
-    "sigma_y",
-    "sigma_z",
-    "verdict",
-    "weight",
-    "innovation_sigma",
-    "reason",
-]
+FIXED = "time,x,y,z,vx,vy,vz,sigma_x,sigma_y,sigma_z,verdict,weight,innovation_sigma,reason"
 T0 = 1_699_643_598.720397
 
 
@@ -73,9 +58,10 @@ def put(writer: TrackWriter, n: int, start: int = 0, **lon: float) -> None:
     )
 
 
-def interrupt(writer: TrackWriter, error: type[BaseException]) -> None:
-    put(writer, 3)
-    raise error
+def interrupted(file: Path, error: type[BaseException]) -> None:
+    with track_writer(file, geographic=True) as writer:
+        put(writer, 3)
+        raise error
 
 
 def test_csv_columns_and_decimals(tmp_path: Path) -> None:
@@ -84,7 +70,7 @@ def test_csv_columns_and_decimals(tmp_path: Path) -> None:
         put(writer, 3)
         put(writer, 2, start=3)
     lines = file.read_text().splitlines()
-    assert lines[0].split(",") == [*FIXED, "lat", "lon", "depth", "sensor", "row"]
+    assert lines[0] == f"{FIXED},lat,lon,depth,sensor,row"
     assert lines[1] == (
         '1699643598.720397,0,0,,1,1,1,0.00002,0.00002,0.00002,"used",1,0.5,"agrees",'
         '36,-122,500,"usbl",0'
@@ -111,7 +97,7 @@ def test_columns_follow_the_input(
     with track_writer(file, geographic=geographic, has_depth=has_depth):
         pass  # even a log without any fix has its header
     found = pd.read_csv(file) if suffix == ".csv" else pq.read_table(file).to_pandas()
-    assert list(found.columns) == [*FIXED, *more]
+    assert list(found.columns) == [*FIXED.split(","), *more]
     assert len(found) == 0
 
 
@@ -168,8 +154,8 @@ def test_nothing_is_left_of_an_interrupted_file(
 ) -> None:
     file = tmp_path / f"out{suffix}"
     file.write_text("before")
-    with pytest.raises(error), track_writer(file, geographic=True) as writer:
-        interrupt(writer, error)
+    with pytest.raises(error):
+        interrupted(file, error)
     assert file.read_text() == "before"
     assert list(tmp_path.iterdir()) == [file]
 

@@ -99,6 +99,7 @@ class Converter:
             self._columns[pick.column],
             self._columns[date.column] if date else None,
             decimal_comma=self._comma,
+            calendar=pick.unit == "iso",
         )
         if self.row == 0 and len(cells.bad) and not np.isfinite(cells.values).any():
             raise self._no_times(pick, int(cells.bad[0]))
