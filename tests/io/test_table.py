@@ -232,7 +232,7 @@ def test_missing_file_and_directory(tmp_path: Path) -> None:
         read_table(tmp_path / "nothing.csv")
     with pytest.raises(InputError, match="directory"):
         read_table(tmp_path)
-    with pytest.raises(InputError, match="not a Parquet file"):
+    with pytest.raises(InputError, match="not a sound Parquet file"):
         read_table(write(tmp_path, "time,x\n", "log.parquet"))
 
 
@@ -264,6 +264,16 @@ def test_parquet_and_nested_columns(tmp_path: Path) -> None:
     assert_allclose(fixes(log).time, [1.0, np.nan])
     assert_allclose(fixes(log).position, [[1, 2, np.nan], [np.nan] * 3])
     assert log.sensors == ("a", "b")
+
+
+def test_damaged_parquet_is_an_input_error(tmp_path: Path) -> None:
+    file = tmp_path / "log.parquet"
+    pq.write_table(pa.table({"time": np.arange(9999.0), "x": np.arange(9999.0) ** 1.5}), file)
+    data = bytearray(file.read_bytes())
+    data[4:4000] = bytes(3996)
+    file.write_bytes(data)
+    with pytest.raises(InputError, match="not a sound Parquet file"):
+        list(read_table(file))
 
 
 @pytest.mark.parametrize("make", [dict, pd.DataFrame, pl.DataFrame, pa.table])

@@ -8,6 +8,7 @@ positive number is NaN, counted as ``sigma``; a word other than accept or reject
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -166,10 +167,21 @@ def _place(block: delimited.Block) -> Callable[[int], str]:
 
 
 def _is_parquet(path: Path) -> bool:
-    if not path.is_file():
+    try:
+        with path.open("rb") as file:
+            return file.read(4) == b"PAR1" or path.suffix.lower() == ".parquet"
+    except OSError:  # the reader of text says what is wrong with it
         return False
-    with path.open("rb") as file:
-        return file.read(4) == b"PAR1" or path.suffix.lower() == ".parquet"
+
+
+@contextlib.contextmanager
+def _parquet_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(
+            f"{path}: not a sound Parquet file ({error})", "a whole Parquet file", "write it again"
+        ) from error
 
 
 def _parquet(
@@ -179,11 +191,7 @@ def _parquet(
     sensor: str,
     progress: Progress | None,
 ) -> Iterator[Log]:
-    try:
-        file = pq.ParquetFile(path)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: not a Parquet file ({error})", "a whole Parquet file") from error
-    with file:
+    with _parquet_errors(path), pq.ParquetFile(path) as file:
         empty = _flat(file.schema_arrow.empty_table())
         head = next(file.iter_batches(1), None)
         if head is None or file.metadata.num_rows == 0:
@@ -197,7 +205,12 @@ def _parquet(
 
     def logs() -> Iterator[Log]:
         with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(_ROWS, columns=[names[i] for i in wanted]):
+            batches = file.iter_batches(_ROWS, columns=[names[i] for i in wanted])
+            while True:
+                with _parquet_errors(path):
+                    batch = next(batches, None)
+                if batch is None:
+                    return
                 table = _flat(pa.table(batch))
                 columns = {i: table.column(names[i]) for i in wanted}
                 yield converter.log(columns, table.num_rows)
