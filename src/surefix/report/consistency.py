@@ -31,7 +31,7 @@ def innovations(name: str, panel: Series, clock: Clock) -> Figure | None:
     if not np.isfinite(sigma).any():
         return None
     size = np.maximum(sigma, _FLOOR)
-    groups = drawn(np.column_stack((size, verdicts.weight + 0.0 * size)), verdicts)
+    groups = drawn(panel.basis, verdicts)
     labels = {g.verdict: hover(verdicts, g.rows, panel.names, panel.record) for g in groups}
     time = clock.values(panel.time)
     common: dict[str, Any] = {"labels": labels, "time": time}

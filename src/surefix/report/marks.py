@@ -101,6 +101,8 @@ class Drawn(NamedTuple):
 def drawn(values: FloatArray, verdicts: Verdicts) -> tuple[Drawn, ...]:
     """Choose the rows to draw, per verdict, drawn from the least to the most remarkable.
 
+    Every figure of one series asks with the same values, and so shows the same rows.
+
     Parameters
     ----------
     values
@@ -109,10 +111,11 @@ def drawn(values: FloatArray, verdicts: Verdicts) -> tuple[Drawn, ...]:
         (n,) verdicts.
     """
     present = np.isfinite(values).any(axis=1)
+    columns = np.column_stack((values, verdicts.innovation_sigma))
     groups = []
     for verdict, limit in _LIMITS.items():
         rows = np.flatnonzero((verdicts.verdict == verdict) & present)
-        groups.append(Drawn(verdict, rows[extremes(values[rows], limit)], rows.size))
+        groups.append(Drawn(verdict, rows[extremes(columns[rows], limit)], rows.size))
     return tuple(groups)
 
 

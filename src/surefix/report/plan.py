@@ -23,7 +23,7 @@ def plan(cleaned: Cleaned, clock: Clock) -> Figure | None:
     if not both.any():
         return None
     shown = np.where(both[:, None], raw, np.nan)
-    groups = drawn(shown, cleaned.verdicts)
+    groups = drawn(raw, cleaned.verdicts)
     names = [cleaned.sensors[i] for i in cleaned.sensor]
     labels = {g.verdict: hover(cleaned.verdicts, g.rows, names, cleaned.row) for g in groups}
     time = clock.values(track.time)
@@ -48,12 +48,12 @@ def plan(cleaned: Cleaned, clock: Clock) -> Figure | None:
         "aspect": (ranges[1].high - ranges[1].low) / (ranges[0].high - ranges[0].low),
         "plan": True,
         "what": "fixes",
-        **outside(shown[:, :2], np.concatenate((sure, doubtful)), ranges),
+        **_outside(shown[:, :2], np.concatenate((sure, doubtful)), ranges),
         "note": note(groups),
     }
 
 
-def outside(values: FloatArray, rows: IntArray, ranges: list[View]) -> dict[str, int]:
+def _outside(values: FloatArray, rows: IntArray, ranges: list[View]) -> dict[str, int]:
     """Count the drawn fixes that lie out of the first view."""
     inside = np.ones(rows.size, dtype=np.bool_)
     for column, limits in zip(values.T, ranges, strict=True):

@@ -38,6 +38,10 @@ class Series(NamedTuple):
         True where greater values are drawn lower.
     period
         One turn of an angle, else 0.
+    basis
+        (n, k) what decides which rows are drawn.
+    what
+        What its marks are.
     """
 
     title: str
@@ -50,6 +54,8 @@ class Series(NamedTuple):
     record: IntArray
     down: bool
     period: float
+    basis: FloatArray
+    what: str = "values"
 
 
 def axis_series(cleaned: Cleaned) -> list[Series]:
@@ -70,6 +76,8 @@ def axis_series(cleaned: Cleaned) -> list[Series]:
             cleaned.row,
             sign < 0.0,
             0.0,
+            cleaned.raw_position,
+            "fixes",
         )
         for i, (title, sign) in enumerate(
             zip(("East, m", "North, m", vertical), signs, strict=True)
@@ -104,6 +112,7 @@ def channel_series(channel: CleanedChannel) -> Series:
         np.arange(channel.time.size),
         channel.name.startswith("depth"),
         turn,
+        channel.raw[:, None],
     )
 
 
@@ -126,7 +135,7 @@ def stacked(
             figure["layout"][f"yaxis{i + 1 if i else ''}"]["tickvals"] = [0, 90, 180, 270, 360]
     figure["layout"]["shapes"] += _lines(events, clock)
     figure["outside"] = sum(drawing.outside for drawing in drawings)
-    figure["note"] = max((note(drawing.groups, "values") for drawing in drawings), key=len)
+    figure["note"] = note(drawings[0].groups, panels[0].what)
     return figure
 
 
@@ -174,7 +183,7 @@ class _Drawing(NamedTuple):
 
 
 def _panel(panel: Series, clock: Clock, index: int) -> _Drawing:
-    groups = drawn(panel.raw[:, None], panel.verdicts)
+    groups = drawn(panel.basis, panel.verdicts)
     labels = {
         group.verdict: hover(panel.verdicts, group.rows, panel.names, panel.record)
         for group in groups
