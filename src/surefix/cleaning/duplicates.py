@@ -4,7 +4,8 @@ A sensor that is polled faster than it measures hands out its last fix again and
 each copy looks like an independent confirmation. But a position may also repeat because its digits
 are coarse and the vessel hardly moves, and then every repetition is a measurement. The two are told
 apart by the *grain* of a sensor, the smallest step its digits ever make: where successive positions
-differ by many grains, equality is no coincidence.
+differ by many grains, equality is no coincidence; nor is it where the axes of a sensor repeat
+together far more often than each by itself would have it.
 """
 
 from __future__ import annotations
@@ -21,12 +22,16 @@ __all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "start_rep
 _GRAINS = 4.0  # a hold is believed where positions usually change by at least so many grains
 _CHANGES = 5  # the latest changes, whose median counts
 _IDLE_MIN = 10  # fixes that show an axis to be idle
+_STRETCH = 50  # successive fixes whose steps are compared with their repetitions
+_MOVING = 10  # changes that a stretch needs to say anything
+_TOGETHER = 5.0  # standard deviations by which axes repeat together too often for chance
 
 
 class _Sensor(NamedTuple):
     """One sensor's past: its grain, latest changes in grains, last position, rows of last time."""
 
     grain: FloatArray
+    polled: bool
     changes: FloatArray
     position: FloatArray
     since: float
@@ -146,7 +151,29 @@ def _learn(position: FloatArray) -> _Sensor:
     changes = changes[changes > 0.0]
     usual = float(np.median(changes)) if changes.size else 0.0
     blank = np.full(axes, np.nan)
-    return _Sensor(grain, np.full(_CHANGES, usual), blank, np.nan, np.empty((0, 0)))
+    polled = axes > 1 and _is_polled(steps)
+    return _Sensor(grain, polled, np.full(_CHANGES, usual), blank, np.nan, np.empty((0, 0)))
+
+
+def _is_polled(steps: FloatArray) -> bool:
+    """Tell whether the axes of a head of steps (n, d) repeat together more often than apart.
+
+    Coarse digits repeat on each axis by themselves; a fix that is handed out again repeats on all
+    axes at once. Within stretches where the sensor moves, the number of joint repetitions is
+    compared with what independent axes would give, in standard deviations.
+    """
+    same = steps[:, :2] == 0.0
+    joint, expected, variance = 0.0, 0.0, 0.0
+    for begin in range(0, len(same) - _STRETCH + 1, _STRETCH):
+        part = same[begin : begin + _STRETCH]
+        both = part.all(axis=1)
+        if (~both).sum() < _MOVING:
+            continue
+        chance = part.mean(axis=0).prod()
+        joint += both.sum()
+        expected += _STRETCH * chance
+        variance += _STRETCH * (part.mean(axis=0) * (1.0 - part.mean(axis=0))).prod()
+    return bool(joint - expected > _TOGETHER * variance**0.5)
 
 
 def _in_grains(steps: FloatArray, grain: FloatArray) -> FloatArray:
@@ -200,7 +227,7 @@ def _same_position(
     grains = _in_grains(np.abs(two - one), past.grain)[compared]
     changes = np.concatenate((past.changes, grains))
     usual = np.median(sliding_window_view(changes, _CHANGES), axis=1)
-    held[rows] = same & (usual[np.cumsum(compared)] >= _GRAINS)
+    held[rows] = same & (past.polled | (usual[np.cumsum(compared)] >= _GRAINS))
     return (
         held,
         since,

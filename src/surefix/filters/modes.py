@@ -8,7 +8,7 @@ from surefix.filters.records import Epochs, Estimate, Filtered, Motion, Recovery
 from surefix.filters.rts import Smoothed, smooth_lag
 from surefix.filters.track import blank, filter_track, start
 from surefix.robust.loss import Loss
-from surefix.types import FloatArray, IntArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["from_filtered", "from_smoothed", "lagged", "realtime"]
 
@@ -42,7 +42,14 @@ def from_smoothed(smoothed: Smoothed, decided: Estimate) -> Estimate:
     return decided._replace(mean=smoothed.mean, sigma=np.sqrt(variance))
 
 
-def lagged(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, lag: float) -> Estimate:
+def lagged(
+    motion: Motion,
+    loss: Loss,
+    recovery: Recovery,
+    epochs: Epochs,
+    lag: float,
+    wanted: BoolArray,
+) -> Estimate:
     """Estimate every epoch from the past and the ``lag`` seconds that follow it.
 
     When a run of rejections turns out to be a jump, the epochs from its start are filtered again
@@ -54,6 +61,8 @@ def lagged(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, lag: 
         As for the filter.
     lag
         Seconds ≥ 0.
+    wanted
+        (n,) epochs that are smoothed; the others keep the filter's estimate.
     """
     time, n = epochs.time, len(epochs.time)
     last = np.searchsorted(time, time + lag, side="right") - 1
@@ -69,7 +78,7 @@ def lagged(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, lag: 
         if not jumped:
             continue
         ready = max(int(np.searchsorted(last, head - 1)), done)
-        parts.append(_smoothed(motion, recovery, time, kept, last, done, ready))
+        parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, ready))
         done = ready
         begin = max(int(np.searchsorted(time, np.nanmin(kept.since[head - 1]))), done)
         again = _rows(epochs, begin, head)
@@ -78,7 +87,7 @@ def lagged(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, lag: 
         before = _state_before(motion, recovery, time, kept, begin, state)
         state, redo, count = filter_track(motion, loss, recovery, again, before)
         _write(kept, begin, redo, count)
-    parts.append(_smoothed(motion, recovery, time, kept, last, done, n))
+    parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, n))
     return Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
@@ -101,15 +110,24 @@ def _smoothed(
     time: FloatArray,
     kept: Filtered,
     last: IntArray,
+    wanted: BoolArray,
     first: int,
     until: int,
 ) -> Estimate:
     """Smoothed estimates of the epochs ``first`` … ``until`` − 1."""
     end = int(last[until - 1]) + 1 if until > first else first
     stretch = _cut(kept, first, end)
-    ends = last[first:until] - first
-    smoothed = smooth_lag(motion, recovery, time[first:end], stretch, ends)
-    return from_smoothed(smoothed, from_filtered(_cut(kept, first, until)))
+    decided = from_filtered(_cut(kept, first, until))
+    rows = np.flatnonzero(wanted[first:until])
+    if not len(rows):
+        return decided
+    smoothed = smooth_lag(
+        motion, recovery, time[first:end], stretch, rows, last[first:until][rows] - first
+    )
+    mean, sigma = decided.mean.copy(), decided.sigma.copy()
+    part = from_smoothed(smoothed, decided)
+    mean[rows], sigma[rows] = part.mean, part.sigma
+    return decided._replace(mean=mean, sigma=sigma)
 
 
 def _state_before(

@@ -15,13 +15,14 @@ from scipy.optimize import minimize
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import filter_track, start
 from surefix.robust.loss import loss_named
-from surefix.types import BoolArray, FloatArray, IntArray
+from surefix.types import FloatArray, IntArray
 
 __all__ = [
     "NoiseFigures",
     "Observations",
     "difference_scale",
     "estimate_noise",
+    "grain",
     "speed_scale",
     "variances",
 ]
@@ -90,7 +91,10 @@ def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> fl
     a = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
     residual = y[1:-1] - (a * y[:-2] + (1.0 - a) * y[2:])
     normalised: FloatArray = np.abs(residual) / np.sqrt(1.0 + a**2 + (1.0 - a) ** 2)
-    return float(np.quantile(normalised, 0.25)) / _Q25
+    quarter = float(np.quantile(normalised, 0.25))
+    if quarter == 0.0 and (normalised > 0.0).any():  # coarse digits: most differences are nought
+        quarter = float(np.quantile(normalised[normalised > 0.0], 0.25))
+    return quarter / _Q25
 
 
 def grain(values: FloatArray) -> float:
@@ -152,8 +156,8 @@ def estimate_noise(
     def figures(theta: FloatArray) -> NoiseFigures:
         p, v, i = position.copy(), velocity.copy(), int(free_position.sum())
         j = i + int(free_velocity.sum())
-        p[free_position] = np.maximum(scale.position[free_position] * np.exp(theta[:i]), floor)
-        v[free_velocity] = scale.velocity[free_velocity] * np.exp(theta[i:j])
+        p[free_position] = np.maximum(scale.position[free_position] * _bounded(theta[:i]), floor)
+        v[free_velocity] = scale.velocity[free_velocity] * _bounded(theta[i:j])
         process = reference * np.exp(theta[j]) if free_process else given.process
         return NoiseFigures(p, v, float(process))
 
@@ -175,6 +179,11 @@ def estimate_noise(
         options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1, "maxiter": 60 * size},
     )
     return figures(found.x)
+
+
+def _bounded(theta: FloatArray) -> FloatArray:
+    """Factor on an initial standard deviation, within a factor of 30 of it."""
+    return np.asarray(np.exp(np.clip(theta, -3.4, 3.4)))
 
 
 def _thin(observations: Observations) -> Observations:

@@ -1,7 +1,8 @@
 """Offline estimation: both directions, and no decision that the whole log contradicts.
 
-The filter's decisions are only a beginning. Its jumps are dated back to where they happened, the
-series is smoothed, and every observation is judged again by what all the *others* say of it (its
+The filter's decisions are only a beginning. It runs forward and backward in time, and what either
+pass doubts is left out at first. Jumps are dated back to where they happened, the series is
+smoothed, and every observation is judged again by what all the *others* say of it (its
 deleted residual); the weights that follow are used in the next sweep, until they stand still. That
 is M-estimation of the whole track by iteratively reweighted least squares.
 """
@@ -24,6 +25,7 @@ __all__ = ["offline"]
 
 _SWEEPS = 8
 _STILL = 0.02  # largest change of a weight that counts as standing still
+_DOUBT = 0.5  # a weight below it, in either direction, leaves an observation out at first
 _SHORT = 5  # observations that a stretch between jumps needs to be believed
 _SAME = 4.5  # standard deviations within which both sides of a jump agree
 
@@ -46,18 +48,54 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
         smoothed = smooth(motion, recovery, epochs.time, first)
         return _judged(motion, loss, epochs, first, smoothed)
     fixed, jump = _dated_back(motion, epochs, first)
-    decided = epochs._replace(fixed=fixed, jump=jump)
+    backward = _reversed(motion, epochs)
+    _, last, _ = filter_track(motion, loss, recovery, backward, start(motion, recovery))
+    against, back = _dated_back(motion, backward, last)
+    jump = epochs.jump | _confirmed(motion, epochs.time, jump, back[::-1], recovery.after)
+    doubted = np.fmin(fixed, against[::-1])
+    doubted[doubted < _DOUBT] = 0.0
+    decided = epochs._replace(fixed=doubted, jump=jump)
     for _ in range(_SWEEPS):
         _, filtered, _ = filter_track(motion, loss, recovery, decided, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered)
         found = _judged(motion, loss, epochs, filtered, smoothed)
         jump = _needed(motion, epochs, decided.jump, smoothed)
+        if not np.array_equal(jump, decided.jump):
+            decided = decided._replace(jump=jump)
+            continue
         fixed = _reweighted(motion, loss, epochs, decided, found)
         change = np.nanmax(np.abs(fixed - decided.fixed), initial=0.0)
-        if change < _STILL and np.array_equal(jump, decided.jump):
+        if change < _STILL:
             break
-        decided = decided._replace(fixed=fixed, jump=jump)
+        decided = decided._replace(fixed=fixed)
     return found
+
+
+def _reversed(motion: Motion, epochs: Epochs) -> Epochs:
+    """Give the series as one sees it who travels back in time: velocities change sign."""
+    sign = np.repeat([1.0, -1.0], motion.axes)
+    jump = np.zeros_like(epochs.jump)
+    jump[1:] = epochs.jump[:0:-1]
+    return Epochs(
+        -epochs.time[::-1],
+        epochs.z[::-1] * sign,
+        epochs.variance[::-1],
+        epochs.fixed[::-1],
+        jump,
+    )
+
+
+def _confirmed(
+    motion: Motion, time: FloatArray, jump: IntArray, back: IntArray, within: float
+) -> IntArray:
+    """The jumps of the forward pass that the backward pass also met, ``within`` seconds."""
+    confirmed = np.zeros_like(jump)
+    for g in range(motion.groups):
+        met = time[((back >> g) & 1).astype(np.bool_)]
+        for k in np.flatnonzero((jump >> g) & 1):
+            if len(met) and np.min(np.abs(met - time[k])) <= within:
+                confirmed[k] |= 1 << g
+    return confirmed
 
 
 def _judged(

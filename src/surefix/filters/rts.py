@@ -52,8 +52,7 @@ def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filte
     out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
     if n:
         back = _backward(motion, recovery, time, filtered)
-        last = np.full(n, n - 1)
-        _smooth(filtered, back, last, True, out)
+        _smooth(filtered, back, np.arange(n), np.full(n, n - 1), True, out)
     return out
 
 
@@ -62,22 +61,25 @@ def smooth_lag(
     recovery: Recovery,
     time: FloatArray,
     filtered: Filtered,
+    rows: IntArray,
     last: IntArray,
 ) -> Smoothed:
-    """Smooth the first epochs of a filtered series, each with its own stretch of the future.
+    """Smooth some epochs of a filtered series, each with its own stretch of the future.
 
     Parameters
     ----------
     motion, recovery, time, filtered
         As for `smooth`.
+    rows
+        (k,) the epochs to smooth.
     last
-        (k,), k ≤ n: the last epoch that counts for each of the first k epochs.
+        (k,) the last epoch that counts for each of them.
     """
     states = filtered.mean.shape[1]
     out = Smoothed(np.empty((len(last), states)), np.empty((len(last), states, states)))
     if len(last):
         back = _backward(motion, recovery, time, filtered)
-        _smooth(filtered, back, last, False, out)
+        _smooth(filtered, back, rows, last, False, out)
     return out
 
 
@@ -168,9 +170,14 @@ def _begin(k: int, filtered: Filtered, x: FloatArray, P: FloatArray) -> None:
 
 @kernel
 def _smooth(
-    filtered: Filtered, back: _Backward, last: IntArray, whole: bool, out: Smoothed
+    filtered: Filtered,
+    back: _Backward,
+    rows: IntArray,
+    last: IntArray,
+    whole: bool,
+    out: Smoothed,
 ) -> None:
-    """Smooth epoch k with the data up to epoch ``last[k]``; in one sweep if ``whole``."""
+    """Smooth epoch ``rows[i]`` with the data up to ``last[i]``; all in one sweep if ``whole``."""
     epochs, n = out.mean.shape
     x = np.empty(n)
     P = np.empty((n, n))
@@ -180,7 +187,7 @@ def _smooth(
             _step_back(k, filtered, back, x, P, W)
         else:
             _begin(last[k], filtered, x, P)
-            for j in range(last[k] - 1, k - 1, -1):
+            for j in range(last[k] - 1, rows[k] - 1, -1):
                 _step_back(j, filtered, back, x, P, W)
         for i in range(n):
             out.mean[k, i] = x[i]

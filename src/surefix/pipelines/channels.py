@@ -102,7 +102,13 @@ def clean_channel(
         np.zeros(n, np.int64),
     )
     after, estimated = estimate(
-        options, state.motion, state.recovery, state.lag, epochs, state.filter
+        options,
+        state.motion,
+        state.recovery,
+        state.lag,
+        epochs,
+        np.ones(n, np.bool_),
+        state.filter,
     )
     judged = verdicts(estimated, epochs, state.motion, status, options.loss.code)
     known = estimated.sigma[:, 0] < _UNKNOWN

@@ -112,10 +112,7 @@ def _batch(session: _Session, chunks: list[Chunk], *, final: bool) -> Cleaned:
         for channel in chunk.channels:
             series.setdefault((channel.sensor, channel.name), []).append(channel)
     channels = _channels(session, series, final=final)
-    if rows is None:
-        cleaned = _nothing(session)
-    else:
-        cleaned = _rows(session, rows, events, final=final)
+    cleaned = _nothing(session) if rows is None else _rows(session, rows, events, final=final)
     return replace(
         cleaned,
         channels=channels,
@@ -173,8 +170,9 @@ def _rows(session: _Session, rows: Rows, events: list[Event], *, final: bool) ->
         found = _blank(len(order))
         judged = _unjudged(status_all)
     else:
+        wanted = np.concatenate([~rows.auxiliary, np.ones(len(grid), np.bool_)])[order]
         session.filter, found = estimate(
-            options, setup.motion, setup.recovery, setup.lag, epochs, session.filter
+            options, setup.motion, setup.recovery, setup.lag, epochs, wanted, session.filter
         )
         judged = verdicts(found, epochs, setup.motion, status_all, options.loss.code)
         lost_row = np.concatenate([lost, np.zeros(len(grid), bool)])[order]
@@ -216,7 +214,9 @@ def _steady(tau: FloatArray, last: float) -> FloatArray:
 def _repeats(session: _Session, rows: Rows) -> Repeats:
     fixes = rows.fixes
     if session.repeats is None:
-        session.repeats = start_repeats(fixes.position, fixes.sensor, len(session.sensors))
+        again = np.diff(rows.tau, prepend=np.nan) == 0.0
+        positions = np.where(again[:, None], np.nan, fixes.position)
+        session.repeats = start_repeats(positions, fixes.sensor, len(session.sensors))
         session.idle = constant_axes(fixes.position, fixes.sensor, len(session.sensors))
     recorded = np.hstack([fixes.position, fixes.velocity])
     repeats, session.repeats = find_repeats(rows.tau, recorded, fixes.sensor, session.repeats)

@@ -11,7 +11,7 @@ from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
 from surefix.pipelines.options import CleanOptions
 from surefix.robust.loss import LossCode
-from surefix.types import FloatArray, IntArray, Reason, Verdict, Verdicts
+from surefix.types import BoolArray, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = ["Status", "estimate", "verdicts"]
 
@@ -54,13 +54,17 @@ def estimate(
     recovery: Recovery,
     lag: float,
     epochs: Epochs,
+    wanted: BoolArray,
     state: TrackState,
 ) -> tuple[TrackState, Estimate]:
-    """Estimate a series in the mode the options ask for; only real time goes on from ``state``."""
+    """Estimate a series in the mode the options ask for; only real time goes on from ``state``.
+
+    ``wanted`` (n,) marks the epochs whose estimate becomes a row of the output.
+    """
     if options.mode == "realtime":
         return realtime(motion, options.loss, recovery, epochs, state)
     if options.mode == "lagged":
-        return state, lagged(motion, options.loss, recovery, epochs, lag)
+        return state, lagged(motion, options.loss, recovery, epochs, lag, wanted)
     return state, offline(motion, options.loss, recovery, epochs)
 
 

@@ -20,7 +20,6 @@ from surefix.types import BoolArray, Channel, Event, Fixes, FloatArray, IntArray
 __all__ = ["Chunk", "Rows", "Source", "join_rows", "merged", "take_rows"]
 
 _METRES_PER_DEGREE = 111_195.0
-_SOON = 1 << 16  # rows that are merged at a time where several sources are read
 
 
 class Rows(NamedTuple):
@@ -208,23 +207,19 @@ def _release(sources: list[Source]) -> Rows | None:
         return None
     until = min((s.last_tau for s in sources if not s.ended), default=np.inf)
     out: list[Rows] = []
+    keys: list[FloatArray] = []
     for source in waiting:
         rows = join_rows(source.ready)
-        source.ready = []
-        with np.errstate(invalid="ignore"):
-            stay = (
-                _carried(rows.tau) >= until if np.isfinite(until) else np.zeros(len(rows.tau), bool)
-            )
-        if len(sources) == 1:
-            stay[:] = False
-        if stay.any():
-            source.ready.append(take_rows(rows, stay))
+        key = _carried(rows.tau)
+        stay = (key >= until) & (len(sources) > 1) & (until < np.inf)
+        source.ready = [take_rows(rows, stay)] if stay.any() else []
         out.append(take_rows(rows, ~stay))
+        keys.append(key[~stay])
     together = join_rows(out)
     if len(together.tau) == 0:
         return None
     if len(out) > 1:
-        together = take_rows(together, np.argsort(_carried(together.tau), kind="stable"))
+        together = take_rows(together, np.argsort(np.concatenate(keys), kind="stable"))
     return together
 
 

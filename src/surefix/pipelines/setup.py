@@ -19,6 +19,7 @@ __all__ = ["Setup", "localise", "settle"]
 
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
+_METRES_PER_DEGREE = 111_195.0
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
 _PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
@@ -201,7 +202,7 @@ def _noise(
         )
         given = _given(options, sensors, rows, vertical)
         found = estimate_noise(
-            observations, given, order=MODELS[options.model], quantum=grain(z[known, 0])
+            observations, given, order=MODELS[options.model], quantum=_quantum(rows, block)
         )
         sigma_position[:, block] = found.position[:, None]
         sigma_velocity[:, block] = found.velocity[:, None]
@@ -222,6 +223,17 @@ def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool
     )
     velocity = np.full(len(sensors), options.sigma_velocity or np.nan)
     return NoiseFigures(position, velocity, options.process or np.nan)
+
+
+def _quantum(rows: Rows, block: list[int]) -> float:
+    """Resolution of the recorded positions along the axes of a block, m; the coarsest counts."""
+    recorded = rows.fixes.position[~rows.auxiliary]
+    steps = [grain(recorded[:50_000, axis]) for axis in block]
+    if rows.fixes.geographic and block[0] != 2:
+        latitude = np.nanmedian(recorded[:, 0]) if np.isfinite(recorded[:, 0]).any() else 0.0
+        per_degree = (_METRES_PER_DEGREE, _METRES_PER_DEGREE * np.cos(np.radians(latitude)))
+        steps = [step * scale for step, scale in zip(steps, per_degree, strict=False)]
+    return float(max(steps))
 
 
 def _named(
@@ -245,10 +257,11 @@ def _named(
                 continue
             declared = observations.declared[rows, part]
             source = "given" if np.isfinite(fixed) else "estimated"
-            if np.isfinite(declared).any():
-                value, source = np.nanmedian(declared), "declared"
             unit = "m" if part.start == 0 else "m/s"
-            out.append(Noise(name, word, float(value), unit, source))
+            if np.isfinite(declared).any():
+                out.append(Noise(name, word, float(np.nanmedian(declared)), unit, "declared"))
+            else:
+                out.append(Noise(name, word, float(value), unit, source))
     word = "vertical acceleration" if vertical else "acceleration"
     word = word.replace("acceleration", "jerk") if model == "ca" else word
     source = "given" if np.isfinite(given.process) else "estimated"
