@@ -8,7 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from surefix.report.marks import Clock, drawn, hover, rows_of, traces
-from surefix.report.series import Series, stack
+from surefix.report.series import Series
+from surefix.report.stack import stack
 from surefix.report.style import INK, MARKS, Figure, axis, layout
 from surefix.types import FloatArray, Verdict, Verdicts
 
@@ -32,7 +33,7 @@ def innovations(name: str, panel: Series, clock: Clock) -> Figure | None:
         return None
     size = np.maximum(sigma, _FLOOR)
     groups = drawn(panel.basis, verdicts)
-    labels = {g.verdict: hover(verdicts, g.rows, panel.names, panel.record) for g in groups}
+    labels = {g.verdict: hover(verdicts, g.rows, panel.marks) for g in groups}
     time = clock.values(panel.time)
     common: dict[str, Any] = {"labels": labels, "time": time}
     start = f"{clock.hover}<br>%{{text}}<br>"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surefix.reasons import texts
 from surefix.report.style import MARKS
 from surefix.report.thin import extremes
-from surefix.types import FloatArray, IntArray, Verdict, Verdicts
+from surefix.types import Cleaned, FloatArray, IntArray, Verdict, Verdicts
 
 __all__ = [
     "DOUBTED",
@@ -22,6 +22,7 @@ __all__ = [
     "chosen",
     "clock_of",
     "drawn",
+    "fix_marks",
     "hover",
     "note",
     "rows_of",
@@ -151,23 +152,27 @@ def chosen(verdicts: Verdicts, rows: IntArray) -> Verdicts:
     )
 
 
-def hover(
-    verdicts: Verdicts, rows: IntArray, names: Sequence[str], record: IntArray
-) -> NDArray[np.str_]:
-    """One line per drawn fix: what it is, its verdict and why.
+def fix_marks(cleaned: Cleaned) -> list[str]:
+    """Name each fix by its sensor and its number in the input, (n,) escaped."""
+    names = [html.escape(name) for name in cleaned.sensors]
+    return [
+        f"{names[sensor]}, row {row}"
+        for sensor, row in zip(cleaned.sensor.tolist(), cleaned.row.tolist(), strict=True)
+    ]
+
+
+def hover(verdicts: Verdicts, rows: IntArray, called: str | Sequence[str]) -> NDArray[np.str_]:
+    """One text per drawn value: what it is, its verdict and why.
 
     Parameters
     ----------
-    names
-        (n,) or (1,) name of the sensor of each row; escaped here.
-    record
-        (n,) number in the input.
+    called
+        What each value is called, escaped: one text for all, or (n,).
     """
-    said = texts(chosen(verdicts, rows))
     lines = [
-        f"{html.escape(names[row if len(names) > 1 else 0])}, row {record[row]}"
+        f"{called if isinstance(called, str) else called[row]}"
         f"<br><b>{MARKS[Verdict(verdicts.verdict[row])].name}</b>: {html.escape(why)}"
-        for row, why in zip(rows.tolist(), said, strict=True)
+        for row, why in zip(rows.tolist(), texts(chosen(verdicts, rows)), strict=True)
     ]
     return np.array(lines, dtype=np.str_)
 
@@ -197,8 +202,7 @@ def traces(
     more
         Plotly's own settings, such as the axes.
     """
-    total = sum(group.rows.size for group in groups)
-    crowd = 1.0 if total < 1_500 else 0.8 if total < 4_000 else 0.65
+    crowd = sum(group.rows.size for group in groups)
     return [
         {
             "type": "scatter",
@@ -206,7 +210,9 @@ def traces(
             "name": MARKS[group.verdict].name,
             "x": x[group.rows],
             "y": y[group.rows],
-            "marker": MARKS[group.verdict].style(crowd if group.verdict in SURE else 1.0),
+            "marker": MARKS[group.verdict].style(
+                _scale(crowd if group.verdict in SURE else group.rows.size)
+            ),
             "text": labels[group.verdict],
             "customdata": time[group.rows],
             "hovertemplate": template + "<extra></extra>",
@@ -215,3 +221,8 @@ def traces(
         for group in groups
         if group.rows.size
     ]
+
+
+def _scale(crowd: int) -> float:
+    """Marks shrink where there are many of them."""
+    return 1.0 if crowd < 1_500 else 0.8 if crowd < 4_000 else 0.65

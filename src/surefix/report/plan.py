@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from surefix.report.marks import DOUBTED, SURE, Clock, drawn, hover, note, rows_of, traces
+from surefix.report.marks import (
+    DOUBTED,
+    SURE,
+    Clock,
+    drawn,
+    fix_marks,
+    hover,
+    note,
+    rows_of,
+    traces,
+)
 from surefix.report.style import BAND, CLEAN, Figure, axis, layout
 from surefix.report.thin import View, breaks, extremes, gapped, pieces, view
 from surefix.types import BoolArray, Cleaned, FloatArray, IntArray
@@ -24,8 +34,8 @@ def plan(cleaned: Cleaned, clock: Clock) -> Figure | None:
         return None
     shown = np.where(both[:, None], raw, np.nan)
     groups = drawn(raw, cleaned.verdicts)
-    names = [cleaned.sensors[i] for i in cleaned.sensor]
-    labels = {g.verdict: hover(cleaned.verdicts, g.rows, names, cleaned.row) for g in groups}
+    called = fix_marks(cleaned)
+    labels = {g.verdict: hover(cleaned.verdicts, g.rows, called) for g in groups}
     time = clock.values(track.time)
     template = f"{clock.hover}<br>%{{text}}<br>east %{{x:.2f}} m, north %{{y:.2f}} m"
     marks = traces(groups, shown[:, 0], shown[:, 1], template=template, labels=labels, time=time)
@@ -93,7 +103,7 @@ def _line(cleaned: Cleaned, clock: Clock) -> list[Figure]:
         "y": flat[ends, 1],
         "text": ["start", "end"][: len(ends)],
         "textposition": "top center",
-        "textfont": {"size": 11, "color": CLEAN},
+        "textfont": {"size": 11, "color": CLEAN, "shadow": "0 0 2px #fff, 0 0 4px #fff"},
         "marker": {
             "symbol": ["circle", "square"],
             "size": 9,

@@ -9,7 +9,8 @@ from surefix.report.consistency import histogram, innovations, quantiles
 from surefix.report.headline import headline
 from surefix.report.marks import Clock
 from surefix.report.plan import plan
-from surefix.report.series import Series, axis_series, channel_series, stacked
+from surefix.report.series import Series, axis_series, channel_series, heading_of
+from surefix.report.stack import stacked
 from surefix.report.style import Figure
 from surefix.report.tables import (
     channel_table,
@@ -22,7 +23,7 @@ from surefix.report.tables import (
     worst_table,
 )
 from surefix.report.wording import escape
-from surefix.types import Cleaned
+from surefix.types import Cleaned, CleanedChannel
 
 __all__ = ["Section", "sections"]
 
@@ -93,7 +94,10 @@ def _channels(cleaned: Cleaned, clock: Clock) -> Section:
         stacked(f"channel-{i}", panel.title, [panel], clock, cleaned.events)
         for i, panel in enumerate(panels)
     ]
-    body = channel_table(cleaned.channels) + _places(figures)
+    body = channel_table(cleaned.channels) + "".join(
+        f"<h3>{_named(channel)}</h3>{_place(figure)}"
+        for channel, figure in zip(cleaned.channels, figures, strict=True)
+    )
     return Section("channels", "Depth, heading and other series", "Series", body, tuple(figures))
 
 
@@ -101,7 +105,7 @@ def _consistency(cleaned: Cleaned, clock: Clock) -> Section:
     axes = axis_series(cleaned)
     judged = [("position", "", axes[0])] if axes else []
     judged = judged or [
-        (f"channel-{i}", channel.name, channel_series(channel))
+        (f"channel-{i}", _named(channel), channel_series(channel))
         for i, channel in enumerate(cleaned.channels)
     ]
     figures: list[Figure] = []
@@ -110,13 +114,19 @@ def _consistency(cleaned: Cleaned, clock: Clock) -> Section:
         wide = _present([innovations(f"innovations-{name}", panel, clock)])
         pair = _distribution(name, panel)
         figures += [*wide, *pair]
-        body += f"<h3>{escape(panel.title.partition(',')[0])}</h3>" if title else ""
+        body += f"<h3>{title}</h3>" if title else ""
         body += _places(wide) + (f'<div class="pair">{_places(pair)}</div>' if pair else "")
     explained = f'<p class="lead">{_CONSISTENCY}</p>' + body
     empty = '<p class="none">No innovations: nothing was predicted.</p>'
     return Section(
         "consistency", "Consistency", "Consistency", explained if figures else empty, tuple(figures)
     )
+
+
+def _named(channel: CleanedChannel) -> str:
+    """Quantity and sensor, as HTML."""
+    quantity = escape(heading_of(channel.name).partition(",")[0])
+    return f"{quantity} <small>{escape(channel.sensor)}</small>" if channel.sensor else quantity
 
 
 def _distribution(name: str, panel: Series) -> tuple[Figure, ...]:

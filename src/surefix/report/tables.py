@@ -92,15 +92,15 @@ def worst_table(cleaned: Cleaned, clock: Clock) -> str:
         return _NOTHING.format("No fix was rejected or down-weighted.")
     why = texts(chosen(cleaned.verdicts, rows))
     off = np.sqrt(np.nansum((cleaned.raw_position - cleaned.track.position)[rows] ** 2, axis=1))
-    geographic = cleaned.track.geodetic is not None
+    coordinates = _coordinates(cleaned)
     return table(
-        ["Time", "Row#", "Sensor", *_coordinate_names(cleaned), "Off#", "σ#", "Verdict", "Why"],
+        ["Time", "Row#", "Sensor", *coordinates, "Off#", "σ#", "Verdict", "Why"],
         [
             (
                 instant(cleaned.track.time[row], clock),
                 str(cleaned.row[row]),
                 escape(cleaned.sensors[cleaned.sensor[row]]),
-                *_coordinates(cleaned.raw_coordinates[row], geographic),
+                *(number(values[row], digits) for values, digits in coordinates.values()),
                 number(off[i], 1, "m"),
                 number(cleaned.verdicts.innovation_sigma[row], 1),
                 _badge(Verdict(cleaned.verdicts.verdict[row])),
@@ -112,15 +112,19 @@ def worst_table(cleaned: Cleaned, clock: Clock) -> str:
     )
 
 
-def _coordinate_names(cleaned: Cleaned) -> tuple[str, str, str]:
+def _coordinates(cleaned: Cleaned) -> dict[str, tuple[FloatArray, int]]:
+    """Heading, values and digits of the coordinates that were observed, as they were given."""
+    vertical = "Depth, m#" if cleaned.has_depth else "Height, m#"
     if cleaned.track.geodetic is not None:
-        return "Latitude#", "Longitude#", "Depth, m#" if cleaned.has_depth else "Height, m#"
-    return "x, m#", "y, m#", "Depth, m#" if cleaned.has_depth else "z, m#"
-
-
-def _coordinates(values: FloatArray, geographic: bool) -> tuple[str, str, str]:
-    digits = 6 if geographic else 2
-    return number(values[0], digits), number(values[1], digits), number(values[2], 2)
+        kinds = [("Latitude#", 6), ("Longitude#", 6), (vertical, 2)]
+    else:
+        kinds = [("x, m#", 2), ("y, m#", 2), (vertical, 2)]
+    columns = cleaned.raw_coordinates.T
+    return {
+        name: (values, digits)
+        for (name, digits), values in zip(kinds, columns, strict=True)
+        if np.isfinite(values).any()
+    }
 
 
 def _badge(verdict: Verdict) -> str:
