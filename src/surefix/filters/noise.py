@@ -31,6 +31,7 @@ _OUTLIERS = 0.05  # prior share of gross errors
 _WINDOW = 100.0  # width of the window gross errors fall in, in initial standard deviations
 _Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
 _SAMPLE = 3000  # epochs the likelihood is evaluated on
+_FEW = 30  # rows that a sensor needs for a figure of its own, where there are others
 _BLOCKS = 6  # stretches of the log they come from
 
 
@@ -232,6 +233,8 @@ def _initial(sample: Observations, given: FloatArray, columns: slice, period: fl
             if not np.isfinite(scales[-1]) and seen.any():
                 scales[-1] = 1.0
         usable = [s for s in scales if np.isfinite(s)]
+        if rows.sum() < _FEW and rows.sum() < len(rows) // 2:
+            usable = []
         if np.isnan(out[sensor]) and usable:
             positive = [s for s in usable if s > 0.0]
             out[sensor] = max(positive) if positive else 1e-3
@@ -257,7 +260,9 @@ def variances(observations: Observations, figures: NoiseFigures) -> FloatArray:
     sigma[:, axes:] = figures.velocity[observations.sensor, None]
     known = np.isfinite(observations.declared)
     sigma[known] = observations.declared[known]
-    sigma[~np.isfinite(sigma)] = 1.0
+    for part, pool in ((sigma[:, :axes], figures.position), (sigma[:, axes:], figures.velocity)):
+        known = pool[np.isfinite(pool)]
+        part[~np.isfinite(part)] = np.median(known) if len(known) else 1.0
     return sigma**2
 
 

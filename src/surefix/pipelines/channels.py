@@ -44,6 +44,11 @@ class ChannelState(NamedTuple):
     noise: tuple[Noise, ...] = ()
     filter: TrackState | None = None
 
+    def nothing(self) -> Channel:
+        """An empty part of the series that was begun."""
+        assert self.held is not None
+        return self.held._replace(time=np.empty(0), value=np.empty(0))
+
 
 def clean_channel(
     new: Channel, state: ChannelState, options: CleanOptions, *, final: bool
@@ -110,7 +115,7 @@ def clean_channel(
         np.ones(n, np.bool_),
         state.filter,
     )
-    judged = verdicts(estimated, epochs, state.motion, status, options.loss.code)
+    judged = verdicts(estimated, epochs, state.motion, status)
     known = estimated.sigma[:, 0] < _UNKNOWN
     mean = np.where(known, estimated.mean[:, 0], np.nan)
     cleaned = CleanedChannel(

@@ -10,10 +10,17 @@ from surefix.filters.modes import lagged, realtime
 from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
 from surefix.pipelines.options import CleanOptions
-from surefix.robust.loss import LossCode
 from surefix.types import BoolArray, FloatArray, IntArray, Reason, Verdict, Verdicts
 
-__all__ = ["Status", "estimate", "verdicts"]
+__all__ = [
+    "Status",
+    "blank_status",
+    "estimate",
+    "join_status",
+    "unjudged",
+    "verdicts",
+    "without_position",
+]
 
 _WHOLE = 0.98  # a weight from here on counts as used
 _NONE = 0.02  # a weight up to here counts as rejected
@@ -36,9 +43,9 @@ class Status(NamedTuple):
     reason: IntArray
     detail: FloatArray
 
-    def mark(self, where: FloatArray | IntArray, verdict: Verdict, reason: Reason) -> None:
+    def mark(self, where: BoolArray, verdict: Verdict, reason: Reason) -> None:
         """Set verdict and reason of the rows that have none yet."""
-        rows = np.asarray(where, dtype=np.bool_) & (self.verdict < 0)
+        rows = where & (self.verdict < 0)
         self.verdict[rows] = verdict
         self.reason[rows] = reason
 
@@ -68,9 +75,7 @@ def estimate(
     return state, offline(motion, options.loss, recovery, epochs)
 
 
-def verdicts(
-    found: Estimate, epochs: Epochs, motion: Motion, status: Status, code: int
-) -> Verdicts:
+def verdicts(found: Estimate, epochs: Epochs, motion: Motion, status: Status) -> Verdicts:
     """Give every row its verdict.
 
     The weight is the smallest of the position groups that were observed. A fix is rejected where
@@ -82,8 +87,6 @@ def verdicts(
         What the filter made of which observations.
     status
         What was known before.
-    code
-        The `LossCode` that decided.
     """
     n, d = len(epochs.time), motion.axes
     groups = int(motion.group[:d].max()) + 1
@@ -113,8 +116,6 @@ def verdicts(
     reason = np.where(decided, status.reason, reason)
     detail = np.where(decided, status.detail, detail)
     weight_out = np.where(np.isnan(smallest), 0.0, smallest)
-    if code == LossCode.NONE:
-        reason[(reason == Reason.OFF) & (verdict == Verdict.USED)] = Reason.AGREES
     return Verdicts(
         verdict.astype(np.int64),
         weight_out,
@@ -128,3 +129,31 @@ def verdicts(
 def _fold(function: np.ufunc, columns: FloatArray) -> FloatArray:
     """Smallest or largest of the columns, NaN where all are."""
     return np.asarray(function.reduce(columns, axis=1))
+
+
+def join_status(status: Status, order: IntArray, extra: int) -> Status:
+    """Put the status of rows in the order of their epochs, ``extra`` regular times among them."""
+    more = blank_status(extra)
+    return Status._make(np.concatenate([a, b])[order] for a, b in zip(status, more, strict=True))
+
+
+def without_position(judged: Verdicts, lost: BoolArray) -> Verdicts:
+    """Call a fix missing that brought a velocity at best, unless more is known of it."""
+    where = lost & np.isin(judged.reason, (Reason.AGREES, Reason.OFF, Reason.JUMP))
+    return judged._replace(
+        verdict=np.where(where, int(Verdict.MISSING), judged.verdict),
+        reason=np.where(where, int(Reason.NO_POSITION), judged.reason),
+    )
+
+
+def unjudged(status: Status) -> Verdicts:
+    """Verdicts where there is nothing to filter."""
+    n = len(status.verdict)
+    return Verdicts(
+        np.where(status.verdict < 0, int(Verdict.MISSING), status.verdict),
+        np.zeros(n),
+        np.full(n, np.nan),
+        np.full((n, 3), np.nan),
+        np.where(status.verdict < 0, int(Reason.NO_POSITION), status.reason),
+        status.detail,
+    )

@@ -17,7 +17,16 @@ from surefix.cleaning.clock import ClockState, repair
 from surefix.geo.angle import wrap
 from surefix.types import BoolArray, Channel, Event, Fixes, FloatArray, IntArray, Log, Problem
 
-__all__ = ["Chunk", "Rows", "Source", "join_rows", "merged", "take_rows"]
+__all__ = [
+    "Chunk",
+    "Rows",
+    "Source",
+    "join_fixes",
+    "join_rows",
+    "merged",
+    "take_fixes",
+    "take_rows",
+]
 
 _METRES_PER_DEGREE = 111_195.0
 
@@ -77,29 +86,32 @@ class Source:
 
 def take_rows(rows: Rows, index: IntArray | BoolArray | slice) -> Rows:
     """Pick rows by index, mask or slice."""
-    return Rows(take_fixes(rows.fixes, index), *(column[index] for column in rows[1:]))
+    return Rows(
+        take_fixes(rows.fixes, index),
+        rows.tau[index],
+        rows.time[index],
+        rows.late[index],
+        rows.auxiliary[index],
+    )
 
 
 def take_fixes(fixes: Fixes, index: IntArray | BoolArray | slice) -> Fixes:
     """Pick fixes by index, mask or slice."""
-    return Fixes(*(column[index] for column in fixes[:-1]), fixes.geographic)  # type: ignore[arg-type]
+    return Fixes._make([*(column[index] for column in fixes[:-1]), fixes.geographic])
 
 
 def join_rows(parts: list[Rows]) -> Rows:
     """Put rows one after the other."""
-    return Rows(
-        join_fixes([part.fixes for part in parts]),
-        *(np.concatenate(columns) for columns in zip(*(p[1:] for p in parts), strict=True)),
-    )
+    fixes = join_fixes([part.fixes for part in parts])
+    columns = zip(*(part[1:] for part in parts), strict=True)
+    return Rows._make([fixes, *(np.concatenate(column) for column in columns)])
 
 
 def join_fixes(parts: list[Fixes]) -> Fixes:
     """Put fixes one after the other."""
     columns = zip(*(part[:-1] for part in parts), strict=True)
-    return Fixes(
-        *(np.concatenate(column) for column in columns),  # type: ignore[arg-type]
-        any(part.geographic for part in parts),
-    )
+    geographic = any(part.geographic for part in parts)
+    return Fixes._make([*(np.concatenate(column) for column in columns), geographic])
 
 
 def merged(sources: Iterable[Source], sensors: list[str], reorder_s: float) -> Iterator[Chunk]:

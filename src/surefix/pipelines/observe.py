@@ -1,0 +1,141 @@
+"""Rows of a log as epochs of the filter, and what is known of them before it runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surefix.cleaning.duplicates import Repeats
+from surefix.filters.records import Epochs
+from surefix.pipelines.judge import Status, blank_status
+from surefix.pipelines.rows import Rows
+from surefix.pipelines.setup import Setup
+from surefix.types import BoolArray, Edit, FloatArray, IntArray, Reason, Verdict
+
+__all__ = ["epochs_of", "grid_times", "padded", "status_of", "steady"]
+
+_LONGEST = 60.0  # s: no resampled rows within longer gaps …
+_GAP_INTERVALS = 20.0  # … if they are longer than so many intervals too
+
+
+def steady(tau: FloatArray, last: float) -> FloatArray:
+    """Filter time of every row: rows without a time, or late ones, take that of the row before.
+
+    ``last`` is the filter time of the batch before, −∞ at the beginning.
+    """
+    filled = np.maximum.accumulate(np.where(np.isfinite(tau), tau, last))
+    finite = filled[np.isfinite(filled)]
+    return np.where(np.isfinite(filled), filled, finite[0] if len(finite) else 0.0)
+
+
+def status_of(rows: Rows, repeats: Repeats, *, held: bool) -> Status:
+    """Verdicts that no filter is needed for."""
+    fixes = rows.fixes
+    status = blank_status(len(rows.tau))
+    status.mark(~np.isfinite(rows.tau), Verdict.MISSING, Reason.NO_TIME)
+    status.mark(fixes.edit == Edit.REJECT, Verdict.EDITED, Reason.REJECTED_BY_USER)
+    status.mark(rows.late, Verdict.REJECTED, Reason.LATE)
+    status.mark(repeats.repeated, Verdict.DUPLICATE, Reason.REPEATED)
+    status.mark(~fixes.valid, Verdict.MISSING, Reason.INVALID)
+    if held:
+        status.mark(repeats.held, Verdict.DUPLICATE, Reason.HELD)
+    copies = status.verdict == Verdict.DUPLICATE
+    status.detail[copies] = repeats.first[copies]
+    return status
+
+
+def grid_times(
+    tau: FloatArray, every: float, first: float, last: float, interval: float
+) -> FloatArray:
+    """Regular times from ``first`` to the end of ``tau``, leaving out long gaps.
+
+    Parameters
+    ----------
+    tau
+        (n,) filter times of the batch, n > 0.
+    every, interval
+        Step of the regular times, and usual interval between fixes, s.
+    first
+        The next regular time that is due.
+    last
+        Filter time of the batch before, −∞ at the beginning.
+    """
+    edges = np.concatenate([[last], tau]) if np.isfinite(last) else tau
+    longest = max(_LONGEST, _GAP_INTERVALS * interval)
+    breaks = np.flatnonzero(np.diff(edges) > longest)
+    starts, ends = [first, *edges[breaks + 1]], [*edges[breaks], edges[-1]]
+    pieces = []
+    for a, b in zip(starts, ends, strict=True):
+        low, high = np.ceil((max(a, first) - first) / every), np.floor((b - first) / every)
+        pieces.append(first + every * np.arange(low, high + 1))
+    return np.concatenate(pieces)
+
+
+def epochs_of(
+    rows: Rows,
+    tau: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    status: Status,
+    grid: FloatArray,
+    setup: Setup,
+    sensors: int,
+) -> tuple[IntArray, Epochs]:
+    """Epochs of rows and regular times together.
+
+    Parameters
+    ----------
+    rows, tau
+        n rows and their filter times.
+    position, velocity
+        (n, 3) in the local frame.
+    status
+        Rows it has a verdict for are not observed; rows the user accepts are marked here.
+    grid
+        (g,) times that only take a prediction.
+    setup, sensors
+        Noise figures, and how many sensors there are by now.
+
+    Returns
+    -------
+    order, epochs
+        (n + g,) which row each epoch is (grid times count on from n), and the epochs.
+    """
+    axes, motion, n = list(setup.axes), setup.motion, len(tau)
+    z = np.hstack([position[:, axes], velocity[:, axes]])
+    declared = rows.fixes.sigma_position, rows.fixes.sigma_velocity
+    sigma = np.hstack(
+        [
+            _sigma(own, figures, sensors, rows.fixes.sensor)[:, axes]
+            for own, figures in zip(declared, (setup.position, setup.velocity), strict=True)
+        ]
+    )
+    z[status.verdict >= 0] = np.nan
+    fixed = np.full((n, motion.groups), np.nan)
+    positions = int(motion.group[: len(axes)].max(initial=-1)) + 1
+    accepted = (rows.fixes.edit == Edit.ACCEPT) & (status.verdict < 0)
+    fixed[accepted, :positions] = 1.0
+    status.mark(accepted, Verdict.EDITED, Reason.ACCEPTED_BY_USER)
+    if len(grid):
+        blank = np.full((len(grid), z.shape[1]), np.nan)
+        tau, z = np.concatenate([tau, grid]), np.vstack([z, blank])
+        sigma = np.vstack([sigma, np.ones_like(blank)])
+        fixed = np.vstack([fixed, np.full((len(grid), motion.groups), np.nan)])
+    order = np.argsort(tau, kind="stable") if len(grid) else np.arange(n)
+    jump = np.zeros(len(order), np.int64)
+    return order, Epochs(tau[order], z[order], sigma[order] ** 2, fixed[order], jump)
+
+
+def _sigma(declared: FloatArray, figures: FloatArray, sensors: int, sensor: IntArray) -> FloatArray:
+    """Standard deviation of every component: declared, else its sensor's, else the others'."""
+    by_sensor = np.full((sensors, 3), np.nan)
+    by_sensor[: len(figures)] = figures
+    for axis in range(3):
+        known = by_sensor[np.isfinite(by_sensor[:, axis]), axis]
+        by_sensor[np.isnan(by_sensor[:, axis]), axis] = np.median(known) if len(known) else 1.0
+    return np.where(np.isfinite(declared), declared, by_sensor[sensor])
+
+
+def padded(values: FloatArray | BoolArray, count: int) -> FloatArray | BoolArray:
+    """``values`` along their first axis, filled up with zeros for sensors met later."""
+    more = np.zeros((count - len(values), *values.shape[1:]), values.dtype)
+    return np.concatenate([values, more])
