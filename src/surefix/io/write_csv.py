@@ -12,7 +12,7 @@ import pyarrow.csv as pacsv
 
 from surefix.io.records import Batch, Form, empty, table
 
-__all__ = ["csv_sink", "escaped", "write_table"]
+__all__ = ["csv_sink", "escaped", "table_sink", "write_table"]
 
 _DECIMALS = {"time": 6, "lat": 9, "lon": 9, "weight": 4, "innovation_sigma": 3}
 _OTHERS = 4  # 0.1 mm, 0.1 mm/s
@@ -25,6 +25,13 @@ def csv_sink(file: BinaryIO, form: Form) -> Iterator[Callable[[Batch], None]]:
     """Write batches of a track to an open file."""
     write_table(file, empty(form), header=True)
     yield lambda batch: write_table(file, table(batch, form), header=False)
+
+
+@contextlib.contextmanager
+def table_sink(file: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None]]:
+    """Write tables of one schema to an open file."""
+    write_table(file, schema.empty_table(), header=True)
+    yield lambda rows: write_table(file, rows, header=False)
 
 
 def write_table(file: BinaryIO, rows: pa.Table, *, header: bool) -> None:

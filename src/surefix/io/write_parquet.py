@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from surefix.io.records import Batch, Form, empty, table
 
-__all__ = ["parquet_sink", "write_table"]
+__all__ = ["parquet_sink", "table_sink"]
 
 _PACKING = "zstd"
 
@@ -19,10 +19,12 @@ _PACKING = "zstd"
 @contextlib.contextmanager
 def parquet_sink(file: BinaryIO, form: Form) -> Iterator[Callable[[Batch], None]]:
     """Write batches of a track to an open file; each becomes a row group."""
-    with pq.ParquetWriter(file, empty(form).schema, compression=_PACKING) as writer:
-        yield lambda batch: writer.write_table(table(batch, form))
+    with table_sink(file, empty(form).schema) as sink:
+        yield lambda batch: sink(table(batch, form))
 
 
-def write_table(file: BinaryIO, rows: pa.Table) -> None:
-    """Write a whole table."""
-    pq.write_table(rows, file, compression=_PACKING)
+@contextlib.contextmanager
+def table_sink(file: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None]]:
+    """Write tables of one schema to an open file; each becomes a row group."""
+    with pq.ParquetWriter(file, schema, compression=_PACKING) as writer:
+        yield writer.write_table

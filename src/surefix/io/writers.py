@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
+import pyarrow as pa
+
 from surefix.errors import OutputError
 from surefix.io import write_csv, write_parquet
 from surefix.io.atomic import replacing
@@ -23,6 +25,7 @@ from surefix.types import Cleaned, CleanedChannel, FloatArray, IntArray, Track, 
 __all__ = [
     "SUFFIXES",
     "TrackWriter",
+    "channel_writer",
     "track_writer",
     "write_channel",
     "write_cleaned",
@@ -128,7 +131,18 @@ def write_track(
 
 
 def write_channel(path: str | Path, channel: CleanedChannel, *, iso: bool = False) -> None:
-    """Write a cleaned scalar series: time, value (by its name), raw, rate, sigma and the verdicts.
+    """Write a whole cleaned scalar series; see `channel_writer`."""
+    with channel_writer(path, iso=iso) as add:
+        add(channel)
+
+
+@contextlib.contextmanager
+def channel_writer(
+    path: str | Path, *, iso: bool = False
+) -> Iterator[Callable[[CleanedChannel], None]]:
+    """Open a file for a cleaned scalar series and give the function that writes parts of it.
+
+    Columns: time, value (by its name), raw, rate, sigma and the verdicts.
 
     Raises
     ------
@@ -139,12 +153,18 @@ def write_channel(path: str | Path, channel: CleanedChannel, *, iso: bool = Fals
     suffix = place.suffix.lower()
     if suffix not in SUFFIXES[:2]:
         raise _unknown(place, SUFFIXES[:2])
-    rows = channel_table(channel, iso=iso)
-    with replacing(place) as file:
-        if suffix == ".csv":
-            write_csv.write_table(file, rows, header=True)
-        else:
-            write_parquet.write_table(file, rows)
+    with replacing(place) as file, contextlib.ExitStack() as stack:
+        sink: Callable[[pa.Table], None] | None = None
+
+        def add(channel: CleanedChannel) -> None:
+            nonlocal sink
+            rows = channel_table(channel, iso=iso)
+            if sink is None:
+                kind = write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
+                sink = stack.enter_context(kind(file, rows.schema))
+            sink(rows)
+
+        yield add
 
 
 @contextlib.contextmanager

@@ -59,6 +59,7 @@ class _Session:
     last_tau: float = -np.inf
     next_grid: float = np.nan
     channels: dict[tuple[str, str], ChannelState] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
 
 
 def clean_sources(sources: Iterable[Source], options: CleanOptions) -> Cleaned:
@@ -76,10 +77,11 @@ def clean_batches(sources: Iterable[Source], options: CleanOptions) -> Iterator[
     options
         How to clean.
     """
-    session = _Session(options)
+    inputs = list(sources)
+    session = _Session(options, names=tuple(source.name for source in inputs))
     waiting: list[Chunk] = []
     rows = 0
-    for chunk in merged(sources, session.sensors, options.reorder_s):
+    for chunk in merged(inputs, session.sensors, options.reorder_s, options.sensor_delay_s):
         waiting.append(chunk)
         rows += len(chunk.rows.tau) if chunk.rows is not None else 0
         if options.mode == "realtime" and rows >= (1 if session.setup else HEAD):
@@ -101,6 +103,8 @@ def _batch(session: _Session, chunks: list[Chunk], *, final: bool) -> Cleaned:
         cleaned = nothing(tuple(session.sensors), session.options, session.setup)
     return replace(
         cleaned,
+        sources=session.names,
+        has_depth=any(chunk.has_depth for chunk in chunks),
         channels=_clean_channels(session, series, final=final),
         events=tuple(events),
         problems=tuple(problem for chunk in chunks for problem in chunk.problems),

@@ -25,6 +25,7 @@ def join(parts: list[Cleaned]) -> Cleaned:
         sensors=parts[-1].sensors,
         track=_join_tracks([part.track for part in same]),
         verdicts=_join_verdicts([part.verdicts for part in same]),
+        has_depth=any(part.has_depth for part in parts),
         raw_position=np.concatenate([part.raw_position for part in same]),
         raw_coordinates=np.concatenate([part.raw_coordinates for part in same]),
         sensor=np.concatenate([part.sensor for part in same]),

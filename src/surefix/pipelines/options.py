@@ -43,6 +43,8 @@ class CleanOptions:
         Noise of the fixes: horizontal m, vertical m, velocity m/s.
     sensor_sigma
         The same for single sensors, by name; wins over the three above.
+    sensor_delay_s
+        How much too late a sensor's times are, s, by name; subtracted.
     process
         Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
     every_s
@@ -65,6 +67,7 @@ class CleanOptions:
     sigma_height: float | None = None
     sigma_velocity: float | None = None
     sensor_sigma: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    sensor_delay_s: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     process: float | None = None
     every_s: float | None = None
     reorder_s: float = 10.0
@@ -83,6 +86,9 @@ class CleanOptions:
             _positive(name, figures[name])
         for name, value in self.sensor_sigma.items():
             _positive(f"sigma of sensor {name!r}", value)
+        for name, value in self.sensor_delay_s.items():
+            if not math.isfinite(_number(f"delay of sensor {name!r}", value)):
+                raise OptionsError(f"delay of sensor {name!r} = {value}", "finite seconds")
         if not (math.isfinite(self.reorder_s) and self.reorder_s >= 0.0):
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
@@ -107,10 +113,15 @@ _POSITIVE = (
 def _positive(name: str, value: object) -> None:
     if value is None:
         return
+    number = _number(name, value)
+    if not (math.isfinite(number) and number > 0.0):
+        raise OptionsError(f"{name} = {number}", "a finite number above zero")
+
+
+def _number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise OptionsError(f"{name} = {value!r}", "a number")
-    if not (math.isfinite(value) and value > 0.0):
-        raise OptionsError(f"{name} = {value}", "a finite number above zero")
+    return float(value)
 
 
 def options_from(table: Mapping[str, Any]) -> CleanOptions:

@@ -7,7 +7,7 @@ larger than memory pass through, and the result does not depend on how they were
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 _METRES_PER_DEGREE = 111_195.0
+_WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
 
 
 class Rows(NamedTuple):
@@ -60,6 +61,7 @@ class Chunk(NamedTuple):
     channels: tuple[Channel, ...]
     events: tuple[Event, ...]
     problems: tuple[Problem, ...]
+    has_depth: bool
 
 
 @dataclass
@@ -70,12 +72,16 @@ class Source:
     ----------
     logs
         Chunks of the input, in its order.
+    name
+        What to call it.
     role
-        ``fixes``; or ``depth`` or ``velocity``, whose observations support the fixes.
+        ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or ``heading``,
+        a series that is only cleaned.
     """
 
     logs: Iterator[Log]
     role: str = "fixes"
+    name: str = ""
     clock: ClockState = field(default_factory=ClockState)
     held: Fixes | None = None
     ready: list[Rows] = field(default_factory=list)
@@ -114,7 +120,9 @@ def join_fixes(parts: list[Fixes]) -> Fixes:
     return Fixes._make([*(np.concatenate(column) for column in columns), geographic])
 
 
-def merged(sources: Iterable[Source], sensors: list[str], reorder_s: float) -> Iterator[Chunk]:
+def merged(
+    sources: Iterable[Source], sensors: list[str], reorder_s: float, delay_s: Mapping[str, float]
+) -> Iterator[Chunk]:
     """Read the sources together and give their rows in one order of time.
 
     Parameters
@@ -125,33 +133,39 @@ def merged(sources: Iterable[Source], sensors: list[str], reorder_s: float) -> I
         Names of all sensors; grows as new ones are met, ``Fixes.sensor`` indexes it.
     reorder_s
         How far out of order a row may be, s.
+    delay_s
+        How much too late the times of a sensor are, by name.
     """
     open_sources = list(sources)
     while True:
         reading = [s for s in open_sources if not s.ended]
         if reading:
-            chunk = _advance(min(reading, key=lambda s: s.last_tau), sensors, reorder_s)
+            chunk = _advance(min(reading, key=lambda s: s.last_tau), sensors, reorder_s, delay_s)
         else:
-            chunk = Chunk(None, (), (), ())
+            chunk = Chunk(None, (), (), (), False)
         rows = _release(open_sources)
         yield chunk._replace(rows=rows)
         if not reading:
             return
 
 
-def _advance(source: Source, sensors: list[str], reorder_s: float) -> Chunk:
+def _advance(
+    source: Source, sensors: list[str], reorder_s: float, delay_s: Mapping[str, float]
+) -> Chunk:
     """Read one chunk of a source into its ready rows."""
     log = next(source.logs, None)
     source.ended = log is None
     fixes = _supporting(log, source.role) if log is not None else None
     if fixes is not None and log is not None:
         numbers = np.array([_number(sensors, name) for name in log.sensors] or [0])
-        fixes = fixes._replace(sensor=numbers[fixes.sensor])
+        delays = np.array([delay_s.get(name, 0.0) for name in log.sensors] or [0.0])
+        time = fixes.time - delays[fixes.sensor]
+        fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
     events = _order(source, fixes, reorder_s)
     if log is None:
-        return Chunk(None, (), events, ())
-    channels = log.channels if source.role == "fixes" else ()
-    return Chunk(None, channels, (*log.events, *events), log.problems)
+        return Chunk(None, (), events, (), False)
+    channels = log.channels if source.role in _WITH_CHANNELS else ()
+    return Chunk(None, channels, (*log.events, *events), log.problems, log.depth_positive_down)
 
 
 def _number(sensors: list[str], name: str) -> int:

@@ -1,0 +1,75 @@
+"""Options from a TOML file.
+
+::
+
+    [clean]                       # any option of `surefix clean`
+    mode = "offline"
+    sigma_position = 0.5
+
+    [columns]                     # as --column
+    time = "lcm_timestamp:us"
+
+    [sensor.usbl]                 # single sensors, by name
+    sigma = 1.2
+    delay_s = 0.4
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from surefix.errors import InputError, OptionsError, ParseError
+
+__all__ = ["OptionsFile", "read_options"]
+
+_TABLES = ("clean", "columns", "sensor")
+_SENSOR_KEYS = ("delay_s", "sigma")
+
+
+class OptionsFile(NamedTuple):
+    """What an options file says: fields of `CleanOptions` by name, and columns by role."""
+
+    clean: dict[str, Any]
+    columns: dict[str, str]
+
+
+def read_options(path: str | Path) -> OptionsFile:
+    """Read an options file.
+
+    Raises
+    ------
+    InputError, ParseError
+        The file cannot be read, or is not TOML.
+    OptionsError
+        A table or key is not known, or a value has the wrong type.
+    """
+    place = Path(path)
+    try:
+        content = tomllib.loads(place.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"{place}: {error.strerror}", "a readable TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParseError(f"{place}: {error}", "a TOML file") from error
+    for name, value in content.items():
+        if name not in _TABLES or not isinstance(value, dict):
+            raise OptionsError(
+                f"{place}: {name!r}", "the tables " + ", ".join(f"[{t}]" for t in _TABLES)
+            )
+    columns = content.get("columns", {})
+    for role, column in columns.items():
+        if not isinstance(column, str):
+            raise OptionsError(f"{place}: columns.{role} = {column!r}", 'text such as "time:ms"')
+    clean = dict(content.get("clean", {}))
+    for name, figures in content.get("sensor", {}).items():
+        _add_sensor(place, name, figures, clean)
+    return OptionsFile(clean, columns)
+
+
+def _add_sensor(place: Path, name: str, figures: Any, clean: dict[str, Any]) -> None:
+    if not isinstance(figures, dict) or set(figures) - set(_SENSOR_KEYS):
+        raise OptionsError(f"{place}: [sensor.{name}]", "the keys " + ", ".join(_SENSOR_KEYS))
+    for key, option in (("sigma", "sensor_sigma"), ("delay_s", "sensor_delay_s")):
+        if key in figures:
+            clean[option] = {**clean.get(option, {}), name: figures[key]}
