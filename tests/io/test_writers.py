@@ -18,11 +18,16 @@ from surefix.errors import OutputError
 from surefix.io.atomic import replacing
 from surefix.io.table import read_table
 from surefix.io.write_csv import escaped
-from surefix.io.writers import SUFFIXES, TrackWriter, track_writer, write_channel, write_track
+from surefix.io.writers import SUFFIXES, TrackWriter, resampled_writer, track_writer, write_channel
 from surefix.types import CleanedChannel, Reason, Track, Verdict, Verdicts
 
 FIXED = "time,x,y,z,vx,vy,vz,sigma_x,sigma_y,sigma_z,verdict,weight,innovation_sigma,reason"
 T0 = 1_699_643_598.720397
+
+
+def write_track(path, track, **form):
+    with resampled_writer(path, geographic=track.geodetic is not None, **form) as write:
+        write(track)
 
 
 def track(n: int, lon: float = -122.0, start: int = 0) -> Track:

@@ -26,10 +26,10 @@ __all__ = [
     "SUFFIXES",
     "TrackWriter",
     "channel_writer",
+    "resampled_writer",
     "track_writer",
     "write_channel",
     "write_cleaned",
-    "write_track",
 ]
 
 SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx")
@@ -115,19 +115,16 @@ def write_cleaned(path: str | Path, cleaned: Cleaned, *, iso: bool = False) -> N
         )
 
 
-def write_track(
-    path: str | Path, track: Track, *, has_depth: bool = False, iso: bool = False
-) -> None:
-    """Write a track at times of its own (the resampled one): time … sigma_z, then lat, lon, depth.
+@contextlib.contextmanager
+def resampled_writer(
+    path: str | Path, *, geographic: bool, has_depth: bool = False, iso: bool = False
+) -> Iterator[Callable[[Track], None]]:
+    """Open a file for a track at times of its own and give the function that writes parts of it.
 
-    Raises
-    ------
-    OutputError
-        As `track_writer`.
+    Columns: time … sigma_z, then lat, lon, depth or height; arguments and errors as `track_writer`.
     """
-    form = Form(track.geodetic is not None, has_depth, iso, verdicts=False)
-    with _opened(Path(path), form) as add:
-        add(Batch(track))
+    with _opened(Path(path), Form(geographic, has_depth, iso, verdicts=False)) as add:
+        yield lambda track: add(Batch(track))
 
 
 def write_channel(path: str | Path, channel: CleanedChannel, *, iso: bool = False) -> None:

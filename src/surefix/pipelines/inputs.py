@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,13 @@ from surefix.geo.angle import wrap
 from surefix.geo.local_frame import rotate
 from surefix.io.columns import Role
 from surefix.io.nmea_log import read_nmea, sniff
-from surefix.io.table import read_table
+from surefix.io.table import from_frame, read_table
 from surefix.pipelines.channels import ChannelState, clean_channel
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Source
 from surefix.types import Channel, Fixes, FloatArray, Log
 
-__all__ = ["Progress", "open_inputs", "open_log"]
+__all__ = ["Progress", "open_frames", "open_inputs", "open_log"]
 
 Progress = Callable[[int], None]
 _HEAD = 1 << 16
@@ -73,6 +74,48 @@ def open_inputs(
             turning = list(_supporting(heading, "heading", chosen, require_checksum, None))
         sources.append(Source(_earth_frame(logs, turning), "velocity", Path(velocity).name))
     return sources
+
+
+def open_frames(
+    fixes: Any,
+    *,
+    depth: Any = None,
+    velocity: Any = None,
+    heading: Any = None,
+    columns: Mapping[str, str] | None = None,
+) -> list[Source]:
+    """Open tables (data frames, Arrow tables, mappings of names to arrays) as sources.
+
+    Arguments as for `open_inputs`.
+    """
+    chosen = dict(columns or {})
+    own = {role: column for role, column in chosen.items() if "." not in role}
+    sources = [Source(iter([from_frame(fixes, mapping=own)]), "fixes", "table")]
+
+    def supporting(table: Any, role: Role) -> Log:
+        mine = _own(chosen, role)
+        shared = {"time": chosen["time"]} if "time" in chosen and "time" not in mine else {}
+        try:
+            return from_frame(table, mapping={**shared, **mine}, role=role, sensor=role)
+        except (ParseError, OptionsError):
+            return from_frame(table, mapping=mine, role=role, sensor=role)
+
+    if depth is not None:
+        sources.append(Source(iter([supporting(depth, "depth")]), "depth", "depth"))
+    turning = [supporting(heading, "heading")] if heading is not None else None
+    if turning is not None:
+        sources.append(Source(iter(turning), "heading", "heading"))
+    if velocity is not None:
+        logs = _earth_frame(iter([supporting(velocity, "velocity")]), turning)
+        sources.append(Source(logs, "velocity", "velocity"))
+    return sources
+
+
+def _own(columns: Mapping[str, str], role: str) -> dict[str, str]:
+    """Columns that are meant for the file of one role: ``depth.time`` → ``time``."""
+    return {
+        key.partition(".")[2]: value for key, value in columns.items() if key.startswith(role + ".")
+    }
 
 
 def open_log(
@@ -129,9 +172,7 @@ def _supporting(
     progress: Progress | None,
 ) -> Iterator[Log]:
     """Open a file of another sensor; a shared time column need not be there."""
-    own = {
-        key.partition(".")[2]: value for key, value in columns.items() if key.startswith(role + ".")
-    }
+    own = _own(columns, role)
     shared = {"time": columns["time"]} if "time" in columns and "time" not in own else {}
     try:
         return open_log(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path, PurePath
 from string import Template
 
@@ -18,7 +19,7 @@ from surefix.report.sections import sections
 from surefix.report.wording import escape, instant
 from surefix.types import Cleaned
 
-__all__ = ["write_report"]
+__all__ = ["check_extra", "write_report"]
 
 
 def write_report(cleaned: Cleaned, path: str | Path, *, title: str | None = None) -> None:
@@ -44,6 +45,12 @@ def write_report(cleaned: Cleaned, path: str | Path, *, title: str | None = None
     page = _page(cleaned, title or named or "Clean track")
     with replacing(path) as file:
         file.write(page.encode("utf-8", "replace"))
+
+
+def check_extra() -> None:
+    """Raise the error of `write_report` if Plotly is not installed, before any work is done."""
+    if find_spec("plotly") is None:
+        raise _missing()
 
 
 def _page(cleaned: Cleaned, title: str) -> str:
@@ -98,8 +105,11 @@ def _plotly() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
-        raise MissingExtraError(
-            "the report needs Plotly, which is not installed",
-            remedy="pip install 'surefix[report]'",
-        ) from error
+        raise _missing() from error
     return str(get_plotlyjs()).replace("\r\n", "\n").replace("</script", "<\\/script")
+
+
+def _missing() -> MissingExtraError:
+    return MissingExtraError(
+        "the report needs Plotly, which is not installed", remedy="pip install 'surefix[report]'"
+    )

@@ -1,0 +1,92 @@
+"""The library's front door: the same pipeline as the command line, on files or on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from surefix.pipelines.clean import clean_sources
+from surefix.pipelines.inputs import open_frames, open_inputs
+from surefix.pipelines.options import CleanOptions
+from surefix.types import Cleaned
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["clean", "to_table"]
+
+Data = Any
+"""A file, several files, or a table: a data frame, an Arrow table, a mapping of names to arrays."""
+
+
+def clean(
+    data: Data,
+    *,
+    depth: Data = None,
+    velocity: Data = None,
+    heading: Data = None,
+    columns: Mapping[str, str] | None = None,
+    options: CleanOptions | None = None,
+) -> Cleaned:
+    """Clean a log and give the track, and for every fix a verdict with its reason.
+
+    Parameters
+    ----------
+    data
+        Fixes: ``time`` (s or ISO 8601), ``x, y, z`` (m, z up) or ``lat, lon`` and ``depth`` or
+        ``height``, optionally velocities and standard deviations. A path or several, or a table
+        (pandas, Polars, Arrow, a mapping of names to arrays). It is not modified.
+    depth, velocity, heading
+        Other sensors, each of the same kinds, with their own clocks and rates.
+    columns
+        What columns mean where their names do not say it: ``{"time": "lcm_timestamp:us"}``.
+    options
+        Mode, method and figures; see `CleanOptions`.
+
+    Raises
+    ------
+    InputError, ParseError, OptionsError
+        What was given, what was expected, and the remedy.
+
+    Examples
+    --------
+    >>> cleaned = clean({"time": [0, 1, 2, 3], "x": [0.0, 0.9, 2.1, 3.0]})
+    >>> cleaned.track.position.shape
+    (4, 3)
+    """
+    chosen = options or CleanOptions()
+    if _is_files(data):
+        paths = [data] if isinstance(data, str | Path) else list(data)
+        sources = open_inputs(
+            paths, depth=depth, velocity=velocity, heading=heading, columns=columns
+        )
+    else:
+        sources = open_frames(
+            data, depth=depth, velocity=velocity, heading=heading, columns=columns
+        )
+    return clean_sources(sources, chosen)
+
+
+def _is_files(data: Data) -> bool:
+    if isinstance(data, str | Path):
+        return True
+    return isinstance(data, Sequence) and all(isinstance(item, str | Path) for item in data)
+
+
+def to_table(cleaned: Cleaned) -> pa.Table:
+    """Give the rows of a result as an Arrow table, with the columns of the output files.
+
+    ``to_table(cleaned).to_pandas()`` is a data frame.
+
+    Parameters
+    ----------
+    cleaned
+        From `clean`.
+    """
+    from surefix.io.records import Batch, Form, table
+
+    form = Form(cleaned.track.geodetic is not None, cleaned.has_depth, False)
+    return table(
+        Batch(cleaned.track, cleaned.verdicts, cleaned.sensors, cleaned.sensor, cleaned.row), form
+    )

@@ -1,0 +1,311 @@
+"""The command line: words in, options checked, a pipeline run, words out; nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from surefix.errors import OptionsError, SurefixError
+
+if TYPE_CHECKING:
+    from surefix.pipelines.options import CleanOptions
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="surefix",
+    help="Turn logs full of wild position fixes into a sure track, with a verdict for every fix.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+_SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+Inputs = Annotated[
+    list[Path], typer.Argument(help="Logs: CSV, Parquet or NMEA 0183.", show_default=False)
+]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="ROLE=COLUMN[:UNIT]",
+        help="What a column means, such as time=lcm_timestamp:us or z=-depth; repeatable.",
+    ),
+]
+NoChecksum = Annotated[
+    bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(installed("surefix"))
+        raise typer.Exit
+
+
+@app.command()
+def clean(
+    inputs: Inputs,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="Where to write the track: .csv, .parquet, .geojson or .gpx; repeatable.",
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None, typer.Option(help="realtime, lagged or offline (the default).")
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(help="kalman, gate, huber, igg1, igg3 (the default), igg3-yang or student-t."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(help="Motion: cv, constant velocity (the default), or ca, acceleration."),
+    ] = None,
+    k0: Annotated[float | None, typer.Option(help="Where down-weighting begins, in σ.")] = None,
+    k1: Annotated[float | None, typer.Option(help="Where rejection begins, in σ.")] = None,
+    lag: Annotated[
+        str | None, typer.Option(metavar="DURATION", help="Future seen in the lagged mode.")
+    ] = None,
+    recovery: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DURATION", help="Rejection on end after which a sensor is believed again."
+        ),
+    ] = None,
+    sigma_position: Annotated[
+        float | None, typer.Option(help="Noise of the fixes, m, horizontal.")
+    ] = None,
+    sigma_height: Annotated[
+        float | None, typer.Option(help="Noise of the fixes, m, vertical.")
+    ] = None,
+    sigma_velocity: Annotated[
+        float | None, typer.Option(help="Noise of the velocities, m/s.")
+    ] = None,
+    process: Annotated[
+        float | None,
+        typer.Option(help="Root density of the driving noise, m/s^1.5 (cv) or m/s^2.5 (ca)."),
+    ] = None,
+    every: Annotated[
+        str | None,
+        typer.Option(metavar="DURATION", help="Write the track at regular times, such as 0.5s."),
+    ] = None,
+    depth: Annotated[
+        Path | None, typer.Option(help="Log of a depth sensor that supports the fixes.")
+    ] = None,
+    velocity: Annotated[
+        Path | None, typer.Option(help="Log of a velocity sensor that supports the fixes.")
+    ] = None,
+    heading: Annotated[
+        Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
+    ] = None,
+    column: Columns = None,
+    options: Annotated[
+        Path | None, typer.Option(help="TOML file with options; the command line wins.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+    iso: Annotated[bool, typer.Option("--iso", help="Write times as ISO 8601 in UTC.")] = False,
+    no_checksum: NoChecksum = False,
+    as_json: AsJson = False,
+) -> None:
+    """Clean a log: one row per fix, each with its verdict, beside the clean track."""
+    from surefix.io.columns import mapping
+    from surefix.pipelines.clean import clean_batches
+    from surefix.pipelines.deliver import deliver
+    from surefix.pipelines.inputs import open_inputs
+    from surefix.pipelines.summary import lines, summary
+
+    chosen, columns = _options(
+        options,
+        {
+            "mode": mode,
+            "method": method,
+            "model": model,
+            "k0": k0,
+            "k1": k1,
+            "lag_s": _seconds("--lag", lag),
+            "recovery_s": _seconds("--recovery", recovery),
+            "sigma_position": sigma_position,
+            "sigma_height": sigma_height,
+            "sigma_velocity": sigma_velocity,
+            "process": process,
+            "every_s": _seconds("--every", every),
+        },
+    )
+    if report is not None:
+        _check_report(report)
+    files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
+    with _progress(files, quiet=as_json) as told:
+        sources = open_inputs(
+            inputs,
+            depth=depth,
+            velocity=velocity,
+            heading=heading,
+            columns={**columns, **mapping(column or [])},
+            require_checksum=not no_checksum,
+            progress=told,
+        )
+        done = deliver(clean_batches(sources, chosen), output or [], iso=iso)
+    written = list(done.written)
+    if report is not None:
+        from surefix.report.page import write_report
+
+        write_report(done.cleaned, report)
+        written.append(str(report))
+    _print(summary(done.cleaned, written), lines(done.cleaned, written), as_json)
+
+
+@app.command()
+def info(
+    inputs: Inputs,
+    column: Columns = None,
+    no_checksum: NoChecksum = False,
+    as_json: AsJson = False,
+) -> None:
+    """Say what is in a log: sensors, rates, gaps, faults, and the command that cleans it."""
+    from surefix.io.columns import mapping
+    from surefix.pipelines.info import describe, info_lines
+
+    with _progress(inputs, quiet=as_json) as told:
+        found = describe(
+            inputs,
+            columns=mapping(column or []),
+            require_checksum=not no_checksum,
+            progress=told,
+        )
+    _print(found, info_lines(found), as_json)
+
+
+@app.command()
+def demo(
+    folder: Annotated[Path, typer.Option("-o", "--output", help="Where the files go.")] = Path(
+        "demo"
+    ),
+    seed: Annotated[int, typer.Option(help="Of the simulated dive.")] = 7,
+) -> None:
+    """Simulate an ROV dive, clean it, and hold the result against the truth."""
+    typer.echo("Simulating a dive with USBL, DVL and depth, and cleaning it …")
+    from surefix.pipelines.demo import demonstrate
+
+    done = demonstrate(folder, seed)
+    for line in done.lines:
+        typer.echo(f"  {line}")
+    for path in done.written:
+        typer.echo(f"  wrote {path}")
+
+
+def main() -> None:
+    """Run the command line; every failure ends with one line and a non-zero exit."""
+    _use_utf8()
+    try:
+        app()
+    except SurefixError as error:
+        _fail(str(error), 1)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(141)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+    except Exception as error:
+        if os.environ.get("SUREFIX_DEBUG"):
+            raise
+        kind = type(error).__name__
+        _fail(
+            f"internal error, please report it: {kind}: {error}; "
+            "SUREFIX_DEBUG=1 shows where it happened",
+            70,
+        )
+
+
+def _fail(text: str, code: int) -> None:
+    typer.echo(f"surefix: {' '.join(text.split())}", err=True)
+    sys.exit(code)
+
+
+def _use_utf8() -> None:
+    """Print σ and … whatever the terminal's locale."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure: Callable[..., None] | None = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(encoding="utf-8", errors="replace")
+
+
+def _options(file: Path | None, given: dict[str, Any]) -> tuple[CleanOptions, dict[str, str]]:
+    """Options of the file, over which those of the command line win, and columns of the file."""
+    from surefix.io.options_file import OptionsFile, read_options
+    from surefix.pipelines.options import options_from
+
+    stored = read_options(file) if file is not None else OptionsFile({}, {})
+    words = {name: value for name, value in given.items() if value is not None}
+    return options_from({**stored.clean, **words}), stored.columns
+
+
+def _seconds(option: str, text: str | None) -> float | None:
+    """Read a duration such as 0.5s, 200ms or 2min."""
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ms|s|min|h|)\s*", text)
+    try:
+        if match is not None:
+            return float(match[1]) * _SECONDS[match[2]]
+    except ValueError:
+        pass
+    raise OptionsError(f"{option} {text!r}", "a duration such as 0.5s, 200ms or 2min")
+
+
+def _check_report(path: Path) -> None:
+    """Refuse a report that cannot be written before the work is done."""
+    from surefix.report.page import check_extra
+
+    check_extra()
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise OptionsError(f"--report {path}", "a name that ends in .html")
+
+
+@contextmanager
+def _progress(files: list[Path], *, quiet: bool) -> Iterator[Callable[[int], None] | None]:
+    """Show a bar over the bytes of the inputs, on a terminal only."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+
+    size = sum(path.stat().st_size for path in files if path.is_file())
+    with Progress(
+        TextColumn("reading and cleaning"),
+        BarColumn(),
+        DownloadColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task("", total=size)
+        yield lambda done: bar.update(task, completed=done)
+
+
+def _print(found: dict[str, Any], text: list[str], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        for line in text:
+            typer.echo(line)
