@@ -18,7 +18,7 @@ from surefix.errors import OptionsError, SurefixError
 if TYPE_CHECKING:
     from surefix.pipelines.options import CleanOptions
 
-__all__ = ["app", "main"]
+__all__ = ["app", "clean", "demo", "info", "main"]
 
 app = typer.Typer(
     name="surefix",
@@ -79,7 +79,7 @@ def clean(
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option(help="Motion: cv, constant velocity (the default), or ca, acceleration."),
+        typer.Option(help="Motion: cv, constant velocity; ca, acceleration; auto (the default)."),
     ] = None,
     k0: Annotated[float | None, typer.Option(help="Where down-weighting begins, in σ.")] = None,
     k1: Annotated[float | None, typer.Option(help="Where rejection begins, in σ.")] = None,

@@ -60,12 +60,14 @@ class NoiseFigures(NamedTuple):
     """Standard deviations by sensor, and the root of the process noise density.
 
     ``position`` and ``velocity`` are (sensors,), m and m/s, NaN where the sensor has no such
-    observation; ``process`` is √q, m/s^1.5 for constant velocity.
+    observation; ``process`` is √q, m/s^1.5 for constant velocity. ``cost`` is the negative
+    log-likelihood they reach, 0 where none was evaluated.
     """
 
     position: FloatArray
     velocity: FloatArray
     process: float
+    cost: float = 0.0
 
 
 def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> float:
@@ -166,8 +168,10 @@ def estimate_noise(
         return _cost(sample, figures(theta), scale, order, period)
 
     size = int(free_position.sum()) + int(free_velocity.sum()) + int(free_process)
-    if size == 0 or len(sample.time) < 3:
+    if len(sample.time) < 3:
         return figures(np.zeros(size))
+    if size == 0:
+        return figures(np.zeros(0))._replace(cost=cost(np.zeros(0)))
     best = np.zeros(size)
     if free_process:
         trials = np.array([[*best[:-1], level] for level in np.arange(-9.0, 3.1, 1.5)])
@@ -179,7 +183,7 @@ def estimate_noise(
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1, "maxiter": 60 * size},
     )
-    return figures(found.x)
+    return figures(found.x)._replace(cost=float(found.fun))
 
 
 def _bounded(theta: FloatArray) -> FloatArray:

@@ -47,13 +47,15 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
     if not len(epochs.time) or loss.code == 0:
         smoothed = smooth(motion, recovery, epochs.time, first)
         return _judged(motion, loss, epochs, first, smoothed)
-    fixed, jump = _dated_back(motion, epochs, first)
+    fixed, jump = _dated_back(epochs, first)
     backward = _reversed(motion, epochs)
     _, last, _ = filter_track(motion, loss, recovery, backward, start(motion, recovery))
-    against, back = _dated_back(motion, backward, last)
-    jump = epochs.jump | _confirmed(motion, epochs.time, jump, back[::-1], recovery.after)
+    against, back = _dated_back(backward, last)
+    jump |= _only_backward(motion, epochs, jump, back[::-1], recovery.after)
     doubted = np.fmin(fixed, against[::-1])
     doubted[doubted < _DOUBT] = 0.0
+    for g in range(motion.groups):
+        _drop_short(g, doubted, jump, np.isfinite(epochs.fixed))
     decided = epochs._replace(fixed=doubted, jump=jump)
     for _ in range(_SWEEPS):
         _, filtered, _ = filter_track(motion, loss, recovery, decided, start(motion, recovery))
@@ -85,17 +87,24 @@ def _reversed(motion: Motion, epochs: Epochs) -> Epochs:
     )
 
 
-def _confirmed(
-    motion: Motion, time: FloatArray, jump: IntArray, back: IntArray, within: float
+def _only_backward(
+    motion: Motion, epochs: Epochs, jump: IntArray, back: IntArray, apart: float
 ) -> IntArray:
-    """The jumps of the forward pass that the backward pass also met, ``within`` seconds."""
-    confirmed = np.zeros_like(jump)
+    """Jumps of the backward pass that have none of the forward pass within ``apart`` seconds.
+
+    Each is put before the observation that follows its run in time.
+    """
+    more = np.zeros_like(back)
     for g in range(motion.groups):
-        met = time[((back >> g) & 1).astype(np.bool_)]
-        for k in np.flatnonzero((jump >> g) & 1):
-            if len(met) and np.min(np.abs(met - time[k])) <= within:
-                confirmed[k] |= 1 << g
-    return confirmed
+        observed = np.isfinite(epochs.z[:, motion.group == g]).any(axis=1)
+        rows = np.flatnonzero(observed)
+        known = epochs.time[((jump >> g) & 1).astype(np.bool_)]
+        for k in np.flatnonzero((back >> g) & 1):
+            later = np.searchsorted(rows, k, side="right")
+            alone = not len(known) or np.min(np.abs(known - epochs.time[k])) > apart
+            if alone and later < len(rows):
+                more[rows[later]] |= 1 << g
+    return more
 
 
 def _judged(
@@ -122,7 +131,7 @@ def _bits(mask: IntArray, groups: int) -> BoolArray:
     return ((mask[:, None] >> np.arange(groups)) & 1).astype(np.bool_)
 
 
-def _dated_back(motion: Motion, epochs: Epochs, first: Filtered) -> tuple[FloatArray, IntArray]:
+def _dated_back(epochs: Epochs, first: Filtered) -> tuple[FloatArray, IntArray]:
     """Turn each recovery of the filter into a jump at the start of the run it believed."""
     fixed = np.where(np.isnan(epochs.fixed), first.weight, epochs.fixed)
     jump = epochs.jump.copy()
@@ -132,8 +141,6 @@ def _dated_back(motion: Motion, epochs: Epochs, first: Filtered) -> tuple[FloatA
         jump[run.start] |= 1 << g
         believed = np.isfinite(first.weight[run, g]) & ~user[run, g]
         fixed[run, g][believed] = 1.0
-    for g in range(motion.groups):
-        _drop_short(g, fixed, jump, user)
     return fixed, jump
 
 
@@ -142,7 +149,7 @@ def _drop_short(g: int, fixed: FloatArray, jump: IntArray, user: BoolArray) -> N
     cuts = [0, *np.flatnonzero((jump >> g) & 1).tolist(), len(jump)]
     for begin, end in itertools.pairwise(cuts):
         used = fixed[begin:end, g] > 0.5
-        if len(cuts) > 2 and 0 < used.sum() < _SHORT:
+        if len(cuts) > 2 and used.sum() < _SHORT:
             fixed[begin:end, g][used & ~user[begin:end, g]] = 0.0
             at = end if end < len(jump) else begin
             jump[at] &= ~(1 << g)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -145,15 +146,23 @@ def _settle(
 ) -> ChannelState:
     """Estimate the noise of a series on its head and start its filter."""
     seen = np.isfinite(z)
-    order = MODELS[options.model]
     values = np.column_stack([z[seen], np.full(seen.sum(), np.nan)])
     observations = Observations(
         tau[seen], values, np.zeros(seen.sum(), np.int64), np.full_like(values, np.nan)
     )
     unknown = NoiseFigures(np.array([np.nan]), np.array([np.nan]), np.nan)
-    figures = estimate_noise(
-        observations, unknown, order=order, period=new.period, quantum=grain(z[seen])
-    )
+    tried = {
+        model: estimate_noise(
+            observations,
+            unknown,
+            order=MODELS[model],
+            period=new.period,
+            quantum=grain(z[seen]),
+        )
+        for model in replace(options, process=None).models
+    }
+    model = min(tried, key=lambda name: tried[name].cost)
+    figures, order = tried[model], MODELS[model]
     steps = np.diff(tau[seen])
     steps = steps[steps > 0.0]
     interval = float(np.median(steps)) if len(steps) else 1.0
@@ -167,7 +176,13 @@ def _settle(
     sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
     noise = (
         Noise(new.sensor, new.name, sigma, unit, "estimated"),
-        Noise("motion", f"{new.name} change", figures.process, f"{unit}/s^1.5", "estimated"),
+        Noise(
+            "motion",
+            f"{new.name} change",
+            figures.process,
+            f"{unit}/s^{order - 0.5:g}",
+            "estimated",
+        ),
     )
     return state._replace(
         motion=motion,

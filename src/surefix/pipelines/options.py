@@ -29,7 +29,8 @@ class CleanOptions:
     method
         The robust loss, one of `surefix.robust.loss.LOSSES`.
     model
-        Motion model: ``cv`` constant velocity or ``ca`` constant acceleration.
+        Motion model: ``cv`` constant velocity, ``ca`` constant acceleration, ``auto`` the likelier
+        of the two (``cv`` if ``process`` is given, for their units differ).
     k0, k1
         Constants of the loss, standard deviations (Student-t: k0 is ν).
     false_alarm
@@ -57,7 +58,7 @@ class CleanOptions:
 
     mode: Mode = "offline"
     method: str = "igg3"
-    model: str = "cv"
+    model: str = "auto"
     k0: float | None = None
     k1: float | None = None
     false_alarm: float = 0.0027
@@ -78,8 +79,8 @@ class CleanOptions:
             raise OptionsError(f"mode {self.mode!r}", "one of " + ", ".join(get_args(Mode)))
         if self.method not in LOSSES:
             raise OptionsError(f"method {self.method!r}", "one of " + ", ".join(LOSSES))
-        if self.model not in MODELS:
-            raise OptionsError(f"model {self.model!r}", "one of " + ", ".join(MODELS))
+        if self.model not in (*MODELS, "auto"):
+            raise OptionsError(f"model {self.model!r}", "one of auto, " + ", ".join(MODELS))
         figures = {f.name: getattr(self, f.name) for f in fields(self)}
         figures |= {f"sigma of sensor {name!r}": v for name, v in self.sensor_sigma.items()}
         for name in _POSITIVE:
@@ -97,6 +98,13 @@ class CleanOptions:
     def loss(self) -> Loss:
         """The robust loss these options ask for."""
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The motion models to choose from."""
+        if self.model != "auto":
+            return (self.model,)
+        return ("cv",) if self.process is not None else tuple(MODELS)
 
 
 _POSITIVE = (

@@ -85,6 +85,7 @@ def settings(options: CleanOptions, setup: Setup | None) -> dict[str, str]:
         if options.mode == "lagged":
             used["lag_s"] = setup.lag
         used["interval_s"] = setup.interval
+        used["model"] = setup.model
         if setup.frame is not None:
             used["origin"] = f"{setup.frame.latitude_deg:.7f}, {setup.frame.longitude_deg:.7f}"
     out = {

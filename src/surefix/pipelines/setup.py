@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
+from surefix.filters.noise import speed_scale
 from surefix.filters.records import Motion, Recovery
 from surefix.filters.track import by_block
 from surefix.geo.local_frame import LocalFrame, origin_of, rotate
 from surefix.models.motion import MODELS
+from surefix.pipelines.noise import settle_noise
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows
 from surefix.types import BoolArray, Event, FloatArray, Noise
@@ -19,9 +20,7 @@ __all__ = ["Setup", "localise", "settle"]
 
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
-_METRES_PER_DEGREE = 111_195.0
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
-_PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +35,8 @@ class Setup:
         (3,) m subtracted from metric input, so that the filter works on small numbers.
     axes
         Which of x, y, z are observed.
-    motion, recovery
-        Of the filter; the groups are horizontal and vertical blocks.
+    motion, model, recovery
+        Of the filter; the groups are horizontal and vertical blocks. The motion model by its name.
     interval
         Median interval between fixes, s.
     lag
@@ -54,6 +53,7 @@ class Setup:
     origin: FloatArray
     axes: tuple[int, ...]
     motion: Motion
+    model: str
     recovery: Recovery
     interval: float
     lag: float
@@ -98,9 +98,7 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
     position[:, 2] -= np.where(rows.auxiliary, 0.0, offset[rows.fixes.sensor])
     axes = tuple(i for i in range(3) if np.isfinite(position[:, i]).any())
     interval = _interval(rows, position)
-    sigma_position, sigma_velocity, density, noise = _noise(
-        rows, position, velocity, axes, sensors, options
-    )
+    figures = settle_noise(rows, position, velocity, axes, sensors, options)
     group = by_block(axes)
     speeds = [_speed(rows, position, i) for i in axes]
     after = options.recovery_s or _RECOVERY_FIXES * interval
@@ -109,15 +107,21 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
         origin=origin,
         axes=axes,
         motion=Motion(
-            MODELS[options.model], len(axes), density, group, int(group.max(initial=-1)) + 1, 0.0
+            MODELS[figures.model],
+            len(axes),
+            figures.density,
+            group,
+            int(group.max(initial=-1)) + 1,
+            0.0,
         ),
+        model=figures.model,
         recovery=Recovery(float(after), max([*speeds, 1e-3])),
         interval=interval,
         lag=float(options.lag_s or _LAG_FIXES * interval),
-        position=sigma_position,
-        velocity=sigma_velocity,
+        position=figures.position,
+        velocity=figures.velocity,
         height_offset=offset,
-        noise=noise,
+        noise=figures.noise,
         events=offset_events,
     )
 
@@ -173,96 +177,3 @@ def _speed(rows: Rows, position: FloatArray, axis: int) -> float:
     if rows.auxiliary[seen].any() and (~rows.auxiliary[seen]).any():
         seen &= ~rows.auxiliary
     return speed_scale(rows.tau[seen], position[seen, axis])
-
-
-def _noise(
-    rows: Rows,
-    position: FloatArray,
-    velocity: FloatArray,
-    axes: tuple[int, ...],
-    sensors: list[str],
-    options: CleanOptions,
-) -> tuple[FloatArray, FloatArray, FloatArray, tuple[Noise, ...]]:
-    """Noise of every sensor on the horizontal and the vertical block, given or estimated."""
-    sigma_position = np.full((len(sensors), 3), np.nan)
-    sigma_velocity = np.full((len(sensors), 3), np.nan)
-    density = np.zeros(len(axes))
-    noise: list[Noise] = []
-    for vertical in (False, True):
-        block = [i for i in axes if (i == 2) == vertical]
-        if not block:
-            continue
-        declared = np.hstack(
-            [rows.fixes.sigma_position[:, block], rows.fixes.sigma_velocity[:, block]]
-        )
-        z = np.hstack([position[:, block], velocity[:, block]])
-        known = np.isfinite(rows.tau) & np.isfinite(z).any(axis=1)
-        observations = Observations(
-            rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
-        )
-        given = _given(options, sensors, rows, vertical)
-        found = estimate_noise(
-            observations, given, order=MODELS[options.model], quantum=_quantum(rows, block)
-        )
-        sigma_position[:, block] = found.position[:, None]
-        sigma_velocity[:, block] = found.velocity[:, None]
-        density[[axes.index(i) for i in block]] = found.process**2
-        noise += _named(found, given, sensors, vertical, options.model, observations)
-    return sigma_position, sigma_velocity, density, tuple(noise)
-
-
-def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:
-    """The user's figures per sensor; NaN where there is none."""
-    auxiliary = set(np.unique(rows.fixes.sensor[rows.auxiliary]).tolist())
-    general = options.sigma_height if vertical else options.sigma_position
-    position = np.array(
-        [
-            options.sensor_sigma.get(name, (None if i in auxiliary else general) or np.nan)
-            for i, name in enumerate(sensors)
-        ]
-    )
-    velocity = np.full(len(sensors), options.sigma_velocity or np.nan)
-    return NoiseFigures(position, velocity, options.process or np.nan)
-
-
-def _quantum(rows: Rows, block: list[int]) -> float:
-    """Resolution of the recorded positions along the axes of a block, m; the coarsest counts."""
-    recorded = rows.fixes.position[~rows.auxiliary]
-    steps = [grain(recorded[:50_000, axis]) for axis in block]
-    if rows.fixes.geographic and block[0] != 2:
-        latitude = np.nanmedian(recorded[:, 0]) if np.isfinite(recorded[:, 0]).any() else 0.0
-        per_degree = (_METRES_PER_DEGREE, _METRES_PER_DEGREE * np.cos(np.radians(latitude)))
-        steps = [step * scale for step, scale in zip(steps, per_degree, strict=False)]
-    return float(max(steps))
-
-
-def _named(
-    found: NoiseFigures,
-    given: NoiseFigures,
-    sensors: list[str],
-    vertical: bool,
-    model: str,
-    observations: Observations,
-) -> list[Noise]:
-    axes = observations.z.shape[1] // 2
-    words = ("height", "vertical velocity") if vertical else ("position", "velocity")
-    out = []
-    for sensor, name in enumerate(sensors):
-        rows = observations.sensor == sensor
-        for word, value, fixed, part in (
-            (words[0], found.position[sensor], given.position[sensor], slice(0, axes)),
-            (words[1], found.velocity[sensor], given.velocity[sensor], slice(axes, None)),
-        ):
-            if not np.isfinite(value) or not np.isfinite(observations.z[rows, part]).any():
-                continue
-            declared = observations.declared[rows, part]
-            source = "given" if np.isfinite(fixed) else "estimated"
-            unit = "m" if part.start == 0 else "m/s"
-            if np.isfinite(declared).any():
-                out.append(Noise(name, word, float(np.nanmedian(declared)), unit, "declared"))
-            else:
-                out.append(Noise(name, word, float(value), unit, source))
-    word = "vertical acceleration" if vertical else "acceleration"
-    word = word.replace("acceleration", "jerk") if model == "ca" else word
-    source = "given" if np.isfinite(given.process) else "estimated"
-    return [*out, Noise("motion", word, found.process, _PROCESS_UNIT[model], source)]

@@ -1,0 +1,164 @@
+"""Noise figures and the motion model of a log: what the user gave, else what the data say."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
+from surefix.models.motion import MODELS
+from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.rows import Rows
+from surefix.types import FloatArray, Noise
+
+__all__ = ["Figures", "settle_noise"]
+
+_METRES_PER_DEGREE = 111_195.0
+_PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
+
+
+class Figures(NamedTuple):
+    """Noise figures of a log under one motion model.
+
+    Parameters
+    ----------
+    model
+        ``cv`` or ``ca``.
+    position, velocity
+        (sensors, 3) standard deviations; NaN where a sensor has no such observation.
+    density
+        (axes,) spectral density of the process noise.
+    noise
+        The same for people.
+    cost
+        Negative log-likelihood.
+    """
+
+    model: str
+    position: FloatArray
+    velocity: FloatArray
+    density: FloatArray
+    noise: tuple[Noise, ...]
+    cost: float
+
+
+def settle_noise(
+    rows: Rows,
+    position: FloatArray,
+    velocity: FloatArray,
+    axes: tuple[int, ...],
+    sensors: list[str],
+    options: CleanOptions,
+) -> Figures:
+    """Give the noise of every sensor, under the likeliest of the motion models to choose from.
+
+    Parameters
+    ----------
+    rows
+        The head of a log.
+    position, velocity
+        (n, 3) in the local frame; NaN where not to be used.
+    axes
+        Which of x, y, z are observed.
+    sensors, options
+        Names of the sensors; figures given by the user.
+    """
+    tried = [
+        _under(model, rows, position, velocity, axes, sensors, options) for model in options.models
+    ]
+    return min(tried, key=lambda figures: figures.cost)
+
+
+def _under(
+    model: str,
+    rows: Rows,
+    position: FloatArray,
+    velocity: FloatArray,
+    axes: tuple[int, ...],
+    sensors: list[str],
+    options: CleanOptions,
+) -> Figures:
+    sigma_position = np.full((len(sensors), 3), np.nan)
+    sigma_velocity = np.full((len(sensors), 3), np.nan)
+    density, cost = np.zeros(len(axes)), 0.0
+    noise: list[Noise] = []
+    for vertical in (False, True):
+        block = [i for i in axes if (i == 2) == vertical]
+        if not block:
+            continue
+        declared = np.hstack(
+            [rows.fixes.sigma_position[:, block], rows.fixes.sigma_velocity[:, block]]
+        )
+        z = np.hstack([position[:, block], velocity[:, block]])
+        known = np.isfinite(rows.tau) & np.isfinite(z).any(axis=1)
+        observations = Observations(
+            rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
+        )
+        given = _given(options, sensors, rows, vertical)
+        found = estimate_noise(
+            observations, given, order=MODELS[model], quantum=_quantum(rows, block)
+        )
+        sigma_position[:, block] = found.position[:, None]
+        sigma_velocity[:, block] = found.velocity[:, None]
+        density[[axes.index(i) for i in block]] = found.process**2
+        cost += found.cost
+        noise += _named(found, given, sensors, vertical, model, observations)
+    return Figures(model, sigma_position, sigma_velocity, density, tuple(noise), cost)
+
+
+def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:
+    """The user's figures per sensor; NaN where there is none."""
+    auxiliary = set(np.unique(rows.fixes.sensor[rows.auxiliary]).tolist())
+    general = options.sigma_height if vertical else options.sigma_position
+    position = np.array(
+        [
+            options.sensor_sigma.get(name, (None if i in auxiliary else general) or np.nan)
+            for i, name in enumerate(sensors)
+        ]
+    )
+    velocity = np.full(len(sensors), options.sigma_velocity or np.nan)
+    return NoiseFigures(position, velocity, options.process or np.nan)
+
+
+def _quantum(rows: Rows, block: list[int]) -> float:
+    """Resolution of the recorded positions along the axes of a block, m; the coarsest counts."""
+    recorded = rows.fixes.position[~rows.auxiliary]
+    steps = [grain(recorded[:50_000, axis]) for axis in block]
+    if rows.fixes.geographic and block[0] != 2:
+        latitude = np.nanmedian(recorded[:, 0]) if np.isfinite(recorded[:, 0]).any() else 0.0
+        per_degree = (_METRES_PER_DEGREE, _METRES_PER_DEGREE * np.cos(np.radians(latitude)))
+        steps = [step * scale for step, scale in zip(steps, per_degree, strict=False)]
+    return float(max(steps))
+
+
+def _named(
+    found: NoiseFigures,
+    given: NoiseFigures,
+    sensors: list[str],
+    vertical: bool,
+    model: str,
+    observations: Observations,
+) -> list[Noise]:
+    axes = observations.z.shape[1] // 2
+    words = ("height", "vertical velocity") if vertical else ("position", "velocity")
+    out = []
+    for sensor, name in enumerate(sensors):
+        rows = observations.sensor == sensor
+        for word, value, fixed, part in (
+            (words[0], found.position[sensor], given.position[sensor], slice(0, axes)),
+            (words[1], found.velocity[sensor], given.velocity[sensor], slice(axes, None)),
+        ):
+            if not np.isfinite(value) or not np.isfinite(observations.z[rows, part]).any():
+                continue
+            declared = observations.declared[rows, part]
+            source = "given" if np.isfinite(fixed) else "estimated"
+            unit = "m" if part.start == 0 else "m/s"
+            if np.isfinite(declared).any():
+                out.append(Noise(name, word, float(np.nanmedian(declared)), unit, "declared"))
+            else:
+                out.append(Noise(name, word, float(value), unit, source))
+    word = "vertical acceleration" if vertical else "acceleration"
+    word = word.replace("acceleration", "jerk") if model == "ca" else word
+    source = "given" if np.isfinite(given.process) else "estimated"
+    return [*out, Noise("motion", word, found.process, _PROCESS_UNIT[model], source)]
