@@ -1,8 +1,13 @@
 """The track filter against filterpy and the textbook twins, and the edges of what it is given."""
 
+import itertools
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from filters.worlds import (
     NEVER,
     PLAIN,
@@ -15,9 +20,6 @@ from filters.worlds import (
     twin,
     world,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from reference import kalman as textbook
 from reference import robust_filter
 from surefix.filters.records import Recovery
@@ -188,7 +190,7 @@ def pieces(made, loss, recovery, cuts):
     """Filter a series in several calls; the outputs joined, and the last state."""
     state, parts = made.state, []
     edges = [0, *cuts, len(made.epochs.time)]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         rows = type(made.epochs)(*(field[first:last] for field in made.epochs))
         state, out, done = filter_track(made.motion, loss, recovery, rows, state)
         assert done == last - first
