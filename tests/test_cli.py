@@ -1,0 +1,583 @@
+"""What `surefix clean` promises: columns, rows, files, words, and one line when it fails."""
+
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+
+import gpxpy
+import numpy as np
+import pandas as pd
+import pytest
+
+from acceptance.product import (
+    FIXED,
+    START,
+    VERDICTS,
+    clean,
+    geographic,
+    process,
+    read,
+    sentence,
+    surefix,
+    survey,
+    told_in_one_line,
+    write,
+)
+
+MODES = ("realtime", "lagged", "offline")
+METHODS = ("kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t")
+
+
+@pytest.fixture
+def log(tmp_path):
+    """A metric log with wild fixes, a missing one, a copy, and rows out of order."""
+    columns = pd.DataFrame(survey(300))
+    columns.loc[[40, 111, 203], "x"] += 60.0
+    columns.loc[77, ["x", "y", "z"]] = np.nan
+    columns = pd.concat([columns[:151], columns[150:]], ignore_index=True)
+    columns.iloc[[250, 252]] = columns.iloc[[252, 250]].to_numpy()
+    columns.to_csv(tmp_path / "dive.csv", index=False)
+    return tmp_path / "dive.csv"
+
+
+@pytest.fixture
+def globe(tmp_path):
+    return write(tmp_path / "globe.csv", geographic(survey(120), 60.0, 5.0))
+
+
+def test_columns_and_order(log, tmp_path):
+    clean(log, "-o", tmp_path / "out.csv")
+    assert read(tmp_path / "out.csv").columns.tolist() == [*FIXED, "sensor", "row"]
+
+
+@pytest.mark.parametrize("vertical", ["depth", "height", None])
+def test_columns_of_geographic_input(tmp_path, vertical):
+    columns = geographic(survey(80), 60.0, 5.0)
+    depth = columns.pop("depth")
+    if vertical:
+        columns[vertical] = depth if vertical == "depth" else -depth
+    clean(write(tmp_path / "log.csv", columns), "-o", tmp_path / "out.csv")
+    track = read(tmp_path / "out.csv")
+    expected = [*FIXED, "lat", "lon", vertical or "height", "sensor", "row"]
+    assert track.columns.tolist() == expected
+    if vertical:
+        sign = -1.0 if vertical == "depth" else 1.0
+        np.testing.assert_allclose(track[vertical], sign * track.z, atol=1e-3)
+        assert np.abs(track[vertical] - columns[vertical]).median() < 0.5
+    else:
+        assert track[["z", "vz", "sigma_z", "height"]].isna().all().all()
+
+
+def test_one_row_per_fix_in_the_order_of_time(log, tmp_path):
+    clean(log, "-o", tmp_path / "out.csv")
+    track, raw = read(tmp_path / "out.csv"), read(log)
+    assert sorted(track.row) == list(range(len(raw)))
+    assert (np.diff(track.time) >= 0).all()
+    np.testing.assert_allclose(track.time, raw.time[track.row], atol=1e-6)
+    assert not (np.diff(track.row) > 0).all()
+    assert set(track.verdict) <= VERDICTS
+    assert track.weight.between(0, 1).all()
+    by_row = track.set_index("row").verdict
+    assert (by_row[[40, 111]] == "rejected").all()
+    assert (by_row[77], by_row[151]) == ("missing", "duplicate")
+    assert track.reason.notna().all()
+    used = track[track.verdict == "used"]
+    assert (used.weight > 0.97).all()
+    assert (track[track.verdict == "rejected"].weight < 0.03).all()
+    assert np.isfinite(track[["x", "y", "z", "vx", "vy", "sigma_x"]]).all().all()
+
+
+def test_every_format_says_the_same(globe, tmp_path):
+    names = ("t.csv", "t.parquet", "t.geojson", "t.gpx")
+    outputs = [word for name in names for word in ("-o", tmp_path / name)]
+    done = clean(globe, *outputs)
+    table, exact = read(tmp_path / "t.csv"), read(tmp_path / "t.parquet")
+    assert table.columns.tolist() == exact.columns.tolist()
+    assert table.verdict.tolist() == exact.verdict.tolist()
+    np.testing.assert_allclose(table.lat, exact.lat, atol=1e-9)
+    np.testing.assert_allclose(table.x, exact.x, atol=6e-5)
+    features = json.loads((tmp_path / "t.geojson").read_text())["features"]
+    lines = [f["geometry"] for f in features if f["geometry"]["type"].endswith("LineString")]
+    places = [tuple(place[:2]) for line in lines for place in line["coordinates"]]
+    assert len(places) == len(table)
+    np.testing.assert_allclose(places, table[["lon", "lat"]], atol=1e-7)
+    assert len(features) - len(lines) == len(table)
+    gpx = gpxpy.parse((tmp_path / "t.gpx").read_text())
+    points = [p for t in gpx.tracks for s in t.segments for p in s.points]
+    assert len(points) == len(table)
+    np.testing.assert_allclose([p.latitude for p in points], table.lat, atol=1e-7)
+    assert all(str(tmp_path / name) in done.out for name in names)
+
+
+def test_json_agrees_with_the_file(log, tmp_path):
+    out = tmp_path / "out.csv"
+    told = clean(log, "-o", out, "--json").json
+    track = read(out)
+    assert told["surefix"] == version("surefix")
+    assert told["inputs"] == ["dive.csv"]
+    assert told["outputs"] == [str(out)]
+    assert told["fixes"] == len(track)
+    counted = {word: total for word, total in told["verdicts"].items() if total}
+    assert counted == track.verdict.value_counts().to_dict()
+    assert (told["start"], told["end"]) == (track.time.min(), track.time.max())
+    speed = np.hypot(track.vx, track.vy)
+    assert told["speed_mps"]["clean"]["max"] == pytest.approx(speed.max(), abs=1e-3)
+    assert told["settings"]["mode"] == "offline"
+    assert told["settings"]["method"] == "igg3"
+    assert {n["quantity"] for n in told["noise"]} >= {"position", "height"}
+
+
+def test_without_output_nothing_is_written(log):
+    before = set(log.parent.iterdir())
+    done = clean(log)
+    assert "301 fixes" in done.out
+    assert set(log.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("every", ["0.5s", "250ms", "2", "1min"])
+def test_regular_times(log, tmp_path, mode, every):
+    step = {"0.5s": 0.5, "250ms": 0.25, "2": 2.0, "1min": 60.0}[every]
+    clean(log, "--every", every, "--mode", mode, "-o", tmp_path / "out.csv")
+    track, fixes = read(tmp_path / "out.csv"), read(tmp_path / "out.fixes.csv")
+    assert len(fixes) == 301
+    assert "verdict" not in track.columns
+    np.testing.assert_allclose(np.diff(track.time), step, atol=1e-6)
+    assert (np.round(track.time / step, 6) % 1 == 0).all()
+    assert track.time.iloc[0] - fixes.time.iloc[0] < step
+    assert fixes.time.iloc[-1] - track.time.iloc[-1] < step
+    plain = tmp_path / "plain.csv"
+    clean(log, "--mode", mode, "-o", plain)
+    np.testing.assert_allclose(fixes[["x", "y"]], read(plain)[["x", "y"]], atol=1e-3)
+    between = np.abs(track.x - np.interp(track.time, fixes.time, fixes.x))
+    assert between[track.time > fixes.time.iloc[20]].max() < 2.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_mode_with_every_method(log, tmp_path, mode, method):
+    out = tmp_path / "out.csv"
+    told = clean(log, "--mode", mode, "--method", method, "-o", out, "--json").json
+    track = read(out)
+    assert (told["settings"]["mode"], told["settings"]["method"]) == (mode, method)
+    assert len(track) == 301
+    assert np.isfinite(track[["x", "y", "z", "vx", "vy", "vz", "sigma_x"]]).all().all()
+    by_row = track.set_index("row")
+    wild = by_row.loc[[40, 111]]
+    if method == "kalman":
+        assert (wild.verdict == "used").all()
+    elif method == "huber":
+        assert wild.weight.between(0.0, 0.2, inclusive="neither").all()
+    else:
+        assert (wild.weight < 0.1).all()
+
+
+@pytest.mark.parametrize("model", ["cv", "ca"])
+def test_motion_models(log, tmp_path, model):
+    told = clean(log, "--model", model, "-o", tmp_path / "out.csv", "--json").json
+    assert told["settings"]["model"] == model
+    units = {n["unit"] for n in told["noise"] if n["sensor"] == "motion"}
+    assert units == {"m/s^1.5" if model == "cv" else "m/s^2.5"}
+    by_row = read(tmp_path / "out.csv").set_index("row")
+    assert (by_row.verdict[[40, 111]] == "rejected").all()
+
+
+def test_options_of_a_file_and_over_them_the_command_line(log, tmp_path):
+    file = tmp_path / "surefix.toml"
+    file.write_text('[clean]\nmode = "realtime"\nmethod = "huber"\nsigma_position = 0.75\n')
+    told = clean(log, "--options", file, "--json").json
+    assert told["settings"]["mode"] == "realtime"
+    assert told["settings"]["method"] == "huber"
+    (noise,) = [n for n in told["noise"] if n["quantity"] == "position"]
+    assert (noise["value"], noise["source"]) == (0.75, "given")
+    told = clean(log, "--options", file, "--method", "igg1", "--json").json
+    assert told["settings"]["mode"] == "realtime"
+    assert told["settings"]["method"] == "igg1"
+
+
+def test_columns_of_an_options_file(tmp_path):
+    columns = survey(60)
+    columns["stamp"] = (columns.pop("time") * 1e3).astype(np.int64)
+    write(tmp_path / "log.csv", columns)
+    (tmp_path / "o.toml").write_text('[columns]\ntime = "stamp:ms"\n')
+    clean(tmp_path / "log.csv", "--options", tmp_path / "o.toml", "-o", tmp_path / "out.csv")
+    assert read(tmp_path / "out.csv").time.iloc[0] == START
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[clean]\nmod = 'realtime'\n", ["'mod'", "mode"]),
+        ("[cleaning]\n", ["cleaning", "[clean]"]),
+        ("[sensor.usbl]\nsigmma = 1\n", ["sensor.usbl", "sigma"]),
+        ("[clean]\nmode = 'fast'\n", ["'fast'", "realtime"]),
+        ("[clean]\nsigma_position = 'big'\n", ["sigma_position", "number"]),
+        ("[clean]\nsigma_position = 0\n", ["sigma_position", "above zero"]),
+        ("[clean]\nreorder_s = 'ten'\n", ["reorder_s"]),
+        ("[clean]\nheld = 'no'\n", ["held"]),
+        ("[clean]\nfalse_alarm = 'x'\n", ["false_alarm"]),
+        ("[clean]\nk0 = 'x'\n", ["k0"]),
+        ("[clean]\nmethod = 3\n", ["method"]),
+        ("[clean]\nmode = ['offline']\n", ["mode"]),
+        ("[clean]\nsensor_sigma = 3\n", ["sensor_sigma"]),
+        ("[clean]\nevery_s = nan\n", ["every_s"]),
+        ("[columns]\ntime = 3\n", ["columns.time"]),
+        ("[columns]\ntime = 'nowhere'\n", ["nowhere"]),
+        ("[columns]\nwhen = 'time'\n", ["when"]),
+        ("not toml", ["TOML"]),
+    ],
+)
+def test_wrong_options_files(log, tmp_path, text, words):
+    file = tmp_path / "o.toml"
+    file.write_text(text)
+    line = told_in_one_line(surefix("clean", log, "--options", file, "-o", tmp_path / "out.csv"))
+    assert all(word in line for word in words), line
+    assert not (tmp_path / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--mode", "fast"], ["'fast'", "realtime", "lagged", "offline"]),
+        (["--method", "median"], ["'median'", "igg3", "student-t"]),
+        (["--model", "cj"], ["'cj'", "cv"]),
+        (["--lag", "soon"], ["--lag", "'soon'", "200ms"]),
+        (["--every", "0"], ["every", "above zero"]),
+        (["--every", "-1s"], ["every"]),
+        (["--recovery", "1e400"], ["recovery"]),
+        (["--every", "nan"], ["--every"]),
+        (["--sigma-position", "0"], ["sigma_position", "above zero"]),
+        (["--sigma-position", "-1"], ["sigma_position"]),
+        (["--sigma-height", "inf"], ["sigma_height"]),
+        (["--sigma-velocity", "nan"], ["sigma_velocity"]),
+        (["--process", "0"], ["process"]),
+        (["--k0", "-1"], ["k0"]),
+        (["--k0", "5", "--k1", "2"], ["k0", "k1"]),
+        (["--column", "x"], ["--column x", "role=column"]),
+        (["--column", "speeed=x"], ["speeed"]),
+        (["--column", "x=x:kg"], ["kg"]),
+        (["--column", "x=nowhere"], ["nowhere"]),
+        (["-o", "track.xlsx"], [".xlsx", ".csv"]),
+        (["-o", "track"], ["track", ".csv"]),
+        (["-o", "track.gpx"], ["lat"]),
+        (["-o", "a.csv", "-o", "./a.csv"], ["two outputs"]),
+        (["--report", "report.pdf"], [".html"]),
+        (["--depth", "nowhere.csv"], ["nowhere.csv", "No such file"]),
+        (["--options", "nowhere.toml"], ["nowhere.toml"]),
+    ],
+)
+def test_wrong_words_are_told_in_one_line(log, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    line = told_in_one_line(surefix("clean", log, *words))
+    assert all(word in line for word in told), line
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_unknown_options_are_usage_errors(log):
+    done = surefix("clean", log, "--methd", "igg3")
+    assert done.code == 2
+    assert "--methd" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_the_input_is_not_overwritten(log):
+    """Neither by its own name nor by a link to it."""
+    before = log.read_bytes()
+    done = surefix("clean", log, "-o", log)
+    if done.code == 0:
+        pytest.fail("the raw log was replaced by its own clean track")
+    told_in_one_line(done)
+    assert log.read_bytes() == before
+
+
+def test_report_and_series_beside_the_output(log, tmp_path):
+    columns = read(log)
+    columns["heading"] = 10.0 + np.random.default_rng(1).normal(0, 1, len(columns))
+    columns["speed"] = 1.0 + np.random.default_rng(2).normal(0, 0.05, len(columns))
+    columns.to_csv(log, index=False)
+    page = tmp_path / "report.html"
+    outputs = "-o", tmp_path / "out.csv", "-o", tmp_path / "out.parquet", "--report", page
+    told = clean(log, *outputs, "--json").json
+    assert [c["name"] for c in told["channels"]] == ["heading_deg", "speed_mps"]
+    for suffix in (".csv", ".parquet"):
+        for name in ("heading_deg", "speed_mps"):
+            path = tmp_path / f"out.dive.{name}{suffix}"
+            assert str(path) in told["outputs"]
+            beside = read(path)
+            names = ["time", name, "raw", "rate", "sigma"]
+            assert beside.columns.tolist() == [*names, *FIXED[-4:]]
+            assert len(beside) == len(columns)
+    assert str(page) in told["outputs"]
+    text = page.read_text("utf-8")
+    assert text.lstrip().lower().startswith("<!doctype html>")
+    assert "dive" in text
+    assert not re.search(r"<(?:script|link|img)[^>]+(?:src|href)=[\"']https?:", text)
+
+
+def test_log_of_a_single_series(tmp_path):
+    """Depths alone, as NMEA sentences: the output itself holds them."""
+    rng = np.random.default_rng(1)
+    value = 20.0 + np.sin(np.arange(400) / 60.0) + rng.normal(0, 0.05, 400)
+    value[150] = 95.0
+    lines = [
+        f"2024-05-01T10:{i // 60:02d}:{i % 60:02d}Z " + sentence(f"SDDPT,{v:.2f},0.0,200.0")
+        for i, v in enumerate(value)
+    ]
+    (tmp_path / "sounder.log").write_text("".join(lines), newline="")
+    clean(tmp_path / "sounder.log", "-o", tmp_path / "out.csv")
+    depth = read(tmp_path / "out.csv")
+    names = ["time", "depth_m", "raw", "rate", "sigma", *FIXED[-4:]]
+    assert depth.columns.tolist() == names
+    assert depth.verdict[150] == "rejected"
+    assert np.abs(depth.depth_m[150] - 20.0 - np.sin(2.5)) < 0.3
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_depths_alone_of_a_table(tmp_path):
+    log = survey(200)
+    log["z"][90] -= 30.0
+    table = {"time": log["time"], "depth": -log["z"]}
+    write(tmp_path / "depth.csv", table)
+    clean(tmp_path / "depth.csv", "--column", "z=-depth", "-o", tmp_path / "out.csv")
+    track = read(tmp_path / "out.csv")
+    assert track[["x", "y"]].isna().all().all()
+    assert np.isfinite(track.z).all()
+    assert track.verdict[90] == "rejected"
+
+
+def body_logs(tmp_path, turn=90.0):
+    """A vehicle that makes 1 m/s ahead on a slowly turning heading."""
+    n, rng = 600, np.random.default_rng(7)
+    t = 0.5 * np.arange(n)
+    heading = turn + 60.0 * np.sin(t / 60.0)
+    east, north = np.sin(np.radians(heading)), np.cos(np.radians(heading))
+    x, y = np.cumsum(east) * 0.5, np.cumsum(north) * 0.5
+    noise = rng.normal(0, 1.5, (2, n))
+    write(
+        tmp_path / "usbl.csv",
+        {"time": START + t[::4], "x": (x + noise[0])[::4], "y": (y + noise[1])[::4]},
+    )
+    body = rng.normal(0, 0.02, (2, n)) + np.array([[1.0], [0.0]])
+    write(tmp_path / "dvl.csv", {"time": START + t, "forward": body[0], "starboard": body[1]})
+    write(tmp_path / "gyro.csv", {"time": START + t - 0.1, "heading": heading % 360.0})
+    return x[::4], y[::4]
+
+
+def test_body_velocities_are_turned_by_the_heading(tmp_path, monkeypatch):
+    x, y = body_logs(tmp_path, turn=350.0)
+    monkeypatch.chdir(tmp_path)
+    clean("usbl.csv", "-o", "plain.csv")
+    clean("usbl.csv", "--velocity", "dvl.csv", "--heading", "gyro.csv", "-o", "out.csv")
+    plain, track = read(tmp_path / "plain.csv"), read(tmp_path / "out.csv")
+
+    def rmse(frame):
+        return np.sqrt(np.mean((frame.x - x) ** 2 + (frame.y - y) ** 2))
+
+    assert len(track) == len(x)
+    assert rmse(track) < 0.6 * rmse(plain)
+    assert np.abs(np.hypot(track.vx, track.vy) - 1.0).max() < 0.15
+    assert read(tmp_path / "out.gyro.heading_deg.csv").shape[0] == 600
+
+
+def test_body_velocities_need_a_heading(tmp_path, monkeypatch):
+    body_logs(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    line = told_in_one_line(surefix("clean", "usbl.csv", "--velocity", "dvl.csv"))
+    assert "--heading" in line
+
+
+def test_delay_of_a_sensor_is_taken_out(tmp_path):
+    """A USBL that is a second late beside a depth and a velocity that are not."""
+    n, rng = 400, np.random.default_rng(3)
+    t = START + np.arange(n)
+    x = 50.0 * np.sin(np.arange(n) / 25.0)
+    v = 2.0 * np.cos(np.arange(n) / 25.0)
+    late = {"time": t + 1.0, "x": x + rng.normal(0, 0.3, n), "y": rng.normal(0, 0.3, n)}
+    write(tmp_path / "usbl.csv", late)
+    write(
+        tmp_path / "dvl.csv",
+        {"time": t, "ve": v + rng.normal(0, 0.02, n), "vn": rng.normal(0, 0.02, n)},
+    )
+    file = tmp_path / "o.toml"
+    errors = {}
+    for delay in (0.0, 1.0):
+        file.write_text(f"[sensor.usbl]\ndelay_s = {delay}\n")
+        words = "--velocity", tmp_path / "dvl.csv", "--options", file
+        clean(tmp_path / "usbl.csv", *words, "-o", tmp_path / "out.csv")
+        track = read(tmp_path / "out.csv")
+        np.testing.assert_allclose(track.time, t + 1.0 - delay, atol=1e-6)
+        errors[delay] = np.sqrt(np.mean((track.x - np.interp(track.time, t, x)) ** 2))
+    assert errors[1.0] < 0.2
+    assert errors[1.0] < 0.3 * errors[0.0]
+
+
+def test_edits_of_the_user_win(log, tmp_path):
+    columns = read(log)
+    columns["edit"] = ""
+    columns.loc[40, "edit"] = "accept"
+    columns.loc[60, "edit"] = "reject"
+    columns.to_csv(log, index=False)
+    for mode in MODES:
+        clean(log, "--mode", mode, "-o", tmp_path / "out.csv")
+        by_row = read(tmp_path / "out.csv").set_index("row")
+        assert by_row.verdict[[40, 60]].tolist() == ["edited", "edited"]
+        assert by_row.weight[[40, 60]].tolist() == [1.0, 0.0]
+        reasons = by_row.reason[[40, 60]].tolist()
+        assert reasons == ["accepted by the user", "rejected by the user"]
+        assert by_row.verdict[111] == "rejected"
+        line = columns.x[39:42].mean()
+        assert by_row.x[40] - columns.x[[39, 41]].mean() > 5.0, line
+
+
+def test_declared_sigmas_are_believed(tmp_path):
+    log = survey(300, sigma=0.5)
+    noisy = np.arange(300) % 2 == 0
+    rng = np.random.default_rng(9)
+    log["x"] = log["x"] + np.where(noisy, rng.normal(0, 8, 300), 0)
+    declared = np.where(noisy, 8.0, 0.5)
+    sigmas = {"sigma_x": declared, "sigma_y": np.full(300, 0.5), "sigma_z": np.full(300, 0.5)}
+    told = clean(write(tmp_path / "log.csv", {**log, **sigmas}), "-o", tmp_path / "o.csv", "--json")
+    assert "declared" in {n["source"] for n in told.json["noise"]}
+    track = read(tmp_path / "o.csv")
+    assert (track.verdict == "rejected").mean() < 0.02
+    truth = survey(300, sigma=0.0)["x"]
+    assert np.sqrt(np.mean((track.x - truth) ** 2)) < 0.6
+
+
+def test_times_in_iso(log, tmp_path):
+    clean(log, "--iso", "-o", tmp_path / "iso.csv", "-o", tmp_path / "iso.parquet")
+    clean(log, "-o", tmp_path / "unix.csv")
+    unix, iso = read(tmp_path / "unix.csv"), read(tmp_path / "iso.csv")
+    assert iso.time.str.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z").all()
+    seconds = (pd.to_datetime(iso.time) - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
+    np.testing.assert_allclose(seconds, unix.time, atol=2e-6)
+    assert str(read(tmp_path / "iso.parquet").time.dt.tz) == "UTC"
+    pd.testing.assert_frame_equal(iso.drop(columns="time"), unix.drop(columns="time"))
+
+
+def test_iso_times_and_synonyms_are_read(tmp_path):
+    plain = geographic(survey(100), 60.0, 5.0)
+    clean(write(tmp_path / "log.csv", plain), "-o", tmp_path / "a.csv")
+    stamps = pd.to_datetime(plain["time"], unit="s").strftime("%Y-%m-%dT%H:%M:%SZ")
+    others = {
+        "Timestamp": stamps,
+        "Latitude [deg]": plain["lat"],
+        "LONGITUDE": plain["lon"],
+        "Depth (m)": plain["depth"],
+    }
+    write(tmp_path / "log.csv", others)
+    clean(tmp_path / "log.csv", "-o", tmp_path / "b.csv")
+    pd.testing.assert_frame_equal(read(tmp_path / "a.csv"), read(tmp_path / "b.csv"))
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", "."), ("\t", "."), (";", ",")], ids=["semicolon", "tab", "de"]
+)
+def test_other_separators(log, tmp_path, separator, decimal):
+    clean(log, "-o", tmp_path / "a.csv")
+    other = tmp_path / "sub" / "dive.csv"
+    other.parent.mkdir()
+    read(log).to_csv(other, index=False, sep=separator, decimal=decimal)
+    done = surefix("clean", other, "-o", tmp_path / "b.csv")
+    if decimal == ",":  # a decimal comma is either understood or refused, never misread
+        if done.code:
+            told_in_one_line(done)
+            return
+        assert done.code == 0
+        if read(tmp_path / "b.csv").x.isna().all():
+            assert "input:" in done.out
+            return
+    assert done.code == 0
+    pd.testing.assert_frame_equal(read(tmp_path / "a.csv"), read(tmp_path / "b.csv"))
+
+
+def test_several_logs_are_one_track(tmp_path):
+    log = pd.DataFrame(survey(200))
+    log[::2].to_csv(tmp_path / "one.csv", index=False)
+    log[1::2].to_csv(tmp_path / "two.csv", index=False)
+    clean(tmp_path / "one.csv", tmp_path / "two.csv", "-o", tmp_path / "out.csv")
+    track = read(tmp_path / "out.csv")
+    np.testing.assert_allclose(track.time, log.time)
+    assert track.sensor.tolist() == ["one", "two"] * 100
+    assert track.row.tolist() == [i // 2 for i in range(200)]
+
+
+def test_info_and_the_command_it_proposes(log, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = surefix("info", "dive.csv")
+    assert (done.code, done.err) == (0, "")
+    assert "dive.csv" in done.out
+    told = surefix("info", "dive.csv", "--json").json
+    (stream,) = told["positions"]
+    assert (stream["records"], stream["interval_s"]) == (301, 1.0)
+    assert told["records"]["dive.csv"]
+    words = told["command"].split()
+    assert words[:3] == ["surefix", "clean", "dive.csv"]
+    clean(*words[2:])
+    assert (tmp_path / "dive.clean.csv").exists()
+    assert (tmp_path / "dive.html").exists()
+
+
+def test_a_log_with_nothing_in_it(tmp_path):
+    """A table without records is refused; NMEA without fixes gives the columns and no rows."""
+    (tmp_path / "log.csv").write_text("time,x,y\n")
+    for command in ("clean", "info"):
+        assert "log.csv" in told_in_one_line(surefix(command, tmp_path / "log.csv"))
+    (tmp_path / "log.nmea").write_text(sentence("GPZDA,120000,01,05,2024,00,00"))
+    told = clean(tmp_path / "log.nmea", "-o", tmp_path / "out.csv", "--json").json
+    assert told["fixes"] == 0
+    track = read(tmp_path / "out.csv")
+    assert (track.columns.tolist(), len(track)) == ([*FIXED, "sensor", "row"], 0)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("mode", MODES)
+def test_very_short_logs(tmp_path, n, mode):
+    log = {name: values[:n] for name, values in survey(10).items()}
+    write(tmp_path / "log.csv", log)
+    clean(tmp_path / "log.csv", "--mode", mode, "-o", tmp_path / "out.csv")
+    track = read(tmp_path / "out.csv")
+    assert len(track) == n
+    assert (track.verdict != "rejected").all()
+    assert np.abs(track.x - log["x"]).max() < 1.5
+
+
+def test_demo(tmp_path):
+    done = surefix("demo", "-o", tmp_path / "demo")
+    assert (done.code, done.err) == (0, "")
+    names = {path.name for path in (tmp_path / "demo").iterdir()}
+    assert {"usbl.csv", "depth.csv", "dvl.csv"} < names
+    assert any(name.endswith(".html") for name in names)
+
+
+def test_help_and_version_are_quick():
+    """They must not wait for the compiled kernels to load."""
+    code = (
+        "import sys; sys.argv = ['surefix', '--help']\n"
+        "from surefix.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numba', 'scipy', 'pyarrow', 'pyproj', 'numpy'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert {"clean", "info", "demo"} <= set(done.stdout.split())
+    assert surefix("--version").out.strip() == version("surefix")
+
+
+def test_a_closed_pipe_is_no_failure_to_report(log):
+    """As in ``surefix clean log.csv --json | head -1``."""
+    import os
+
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = process("clean", log, "--json", capture_output=False, stdout=writing, stderr=-1)
+    finally:
+        os.close(writing)
+    assert "Traceback" not in done.stderr
+    assert "internal error" not in done.stderr
