@@ -171,7 +171,8 @@ def clean(
 
         write_report(done.cleaned, report)
         written.append(str(report))
-    _print(summary(done.cleaned, written), lines(done.cleaned, written), as_json)
+    result = done.cleaned, done.counts, written
+    _print(summary(*result), lines(*result), as_json)
 
 
 @app.command()

@@ -30,7 +30,7 @@ __all__ = [
 _OUTLIERS = 0.05  # prior share of gross errors
 _WINDOW = 100.0  # width of the window gross errors fall in, in initial standard deviations
 _Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
-_SAMPLE = 3000  # epochs the likelihood is evaluated on
+_SAMPLE = 2000  # epochs the likelihood is evaluated on
 _FEW = 30  # rows that a sensor needs for a figure of its own, where there are others
 _BLOCKS = 6  # stretches of the log they come from
 
@@ -181,7 +181,7 @@ def estimate_noise(
         cost,
         best,
         method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1, "maxiter": 60 * size},
+        options={"initial_simplex": simplex, "xatol": 0.04, "fatol": 0.3, "maxiter": 60 * size},
     )
     return figures(found.x)._replace(cost=float(found.fun))
 

@@ -23,6 +23,7 @@ _REJECTED = 0.1  # a weight below it counts as a rejection when waiting for a re
 _SETTLED = 10  # observations after which a group's track is trusted
 _UNSETTLED = 6.0  # how much sooner a track that is not yet trusted recovers
 _MIN_STREAK = 3  # rejections a recovery needs at least
+_IMPOSSIBLE = 1e-12  # a Student-t weight up to it is 0
 
 
 @helper
@@ -134,14 +135,19 @@ def _student_weight(
     e: FloatArray,
     y: FloatArray,
     freedom: float,
+    nis: float,
 ) -> float:
     """Expected precision of a Student-t observation by variational iteration.
 
     ``λ = (ν + m) / (ν + E[(z − Hx)ᵀ R⁻¹ (z − Hx)])``, the expectation under the posterior with R/λ.
+    Begun at λ = 1 the iteration would believe anything once P is far larger than R; it begins at
+    the distance from the prediction instead, ``(ν + m) / (ν + d²)``.
     Source: Agamennoni, Nieto and Nebot, IEEE Trans. Signal Processing 60(10), 2012.
     """
-    scale = 1.0
+    scale = (freedom + m) / (freedom + nis)
     for _ in range(5):
+        if not scale > _IMPOSSIBLE:
+            return 0.0
         for i in range(m):
             for j in range(m):
                 C[i, j] = B[index[i], index[j]]
@@ -299,10 +305,11 @@ def run(
                 c = index[i]
                 if B[c, c] < 100.0 * variance[c]:
                     unknown = False
-            if unknown:
+            if unknown and state.streak[g] == 0:  # dead reckoning through a run does not unsettle
                 state.settled[g] = 0
             if loss.code == 6:
-                w = _student_weight(observed, B, variance, nu, index, C, e, y, loss.k0)
+                nis = out.nis[k, g]
+                w = _student_weight(observed, B, variance, nu, index, C, e, y, loss.k0, nis)
             else:
                 w = weight(out.sigma[k, g], loss.code, loss.k0, loss.k1)
             if w < _REJECTED and loss.code != 0:

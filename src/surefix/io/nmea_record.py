@@ -37,7 +37,7 @@ ProblemKind = Literal[
 ]
 
 REMEDIES: dict[ProblemKind, str] = {
-    "no-checksum": "if the source never sends checksums, allow sentences without them",
+    "no-checksum": "if the source sends no checksums, accept sentences without: --no-checksum",
     "checksum": "check cable, baud rate and grounding; damaged sentences are left out",
     "truncated": "the logger lost part of the line; check its buffer and the baud rate",
     "field": "a field is not what the sentence type says; check the version of the device",

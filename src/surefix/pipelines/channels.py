@@ -25,7 +25,10 @@ from surefix.types import (
     Verdict,
 )
 
-__all__ = ["ChannelState", "clean_channel"]
+__all__ = ["CHANNEL_HEAD", "ChannelState", "clean_channel"]
+
+CHANNEL_HEAD = 2000
+"""Values that a series is settled on in real time; the other modes see it whole."""
 
 _RECOVERY_VALUES = 30
 _LAG_VALUES = 20
@@ -61,7 +64,8 @@ def clean_channel(
     new
         The part, in the order of arrival; may be empty.
     state
-        From the part before. The first part is the head on which noise is estimated.
+        From the part before. Noise is estimated on the head of the first part, in real time on its
+        first `CHANNEL_HEAD` values: twice as many should come before it is begun.
     options
         Mode and method; noise figures of positions do not apply.
     final
@@ -80,8 +84,9 @@ def clean_channel(
     raw, tau = value[repaired.order], _filled(repaired.tau)
     state = state._replace(clock=clock, held=held)
     sensor = np.zeros(len(raw), np.int64)
+    head = slice(CHANNEL_HEAD if options.mode == "realtime" else None)
     if state.repeats is None:
-        state = state._replace(repeats=start_repeats(raw[:, None], sensor, 1))
+        state = state._replace(repeats=start_repeats(raw[head, None], sensor[head], 1))
     assert state.repeats is not None
     found, repeats = find_repeats(repaired.tau, raw[:, None], sensor, state.repeats)
     state = state._replace(repeats=repeats)
@@ -96,7 +101,7 @@ def clean_channel(
     ]
     z = np.where(status.verdict < 0, raw, np.nan)
     if state.motion is None:
-        state = _settle(state, new, tau, z, options)
+        state = _settle(state, new, tau[head], z[head], options)
     assert state.motion is not None
     assert state.filter is not None
     n = len(raw)

@@ -18,9 +18,10 @@ from surefix.cleaning.duplicates import (
     find_repeats,
     start_repeats,
 )
+from surefix.errors import InputError
 from surefix.filters.records import TrackState
 from surefix.filters.track import start
-from surefix.pipelines.channels import ChannelState, clean_channel
+from surefix.pipelines.channels import CHANNEL_HEAD, ChannelState, clean_channel
 from surefix.pipelines.joining import join
 from surefix.pipelines.judge import estimate, join_status, unjudged, verdicts, without_position
 from surefix.pipelines.observe import epochs_of, grid_times, padded, status_of, steady
@@ -35,6 +36,7 @@ from surefix.types import (
     CleanedChannel,
     Event,
     FloatArray,
+    Problem,
     Reason,
     Verdict,
     Verdicts,
@@ -44,6 +46,7 @@ __all__ = ["HEAD", "clean_batches", "clean_sources"]
 
 HEAD = 20_000
 """Rows that a log is settled on in real time; the other modes see it whole."""
+_PORTION = 50_000  # rows cleaned at a time in real time; at least HEAD
 
 
 @dataclass
@@ -59,7 +62,9 @@ class _Session:
     last_tau: float = -np.inf
     next_grid: float = np.nan
     channels: dict[tuple[str, str], ChannelState] = field(default_factory=dict)
+    arrived: dict[tuple[str, str], list[Channel]] = field(default_factory=dict)
     names: tuple[str, ...] = ()
+    has_depth: bool = False
 
 
 def clean_sources(sources: Iterable[Source], options: CleanOptions) -> Cleaned:
@@ -76,35 +81,71 @@ def clean_batches(sources: Iterable[Source], options: CleanOptions) -> Iterator[
         The first role is ``fixes``; others support it.
     options
         How to clean.
+
+    Raises
+    ------
+    InputError
+        There is nothing to clean: no fix, no series.
     """
     inputs = list(sources)
     session = _Session(options, names=tuple(source.name for source in inputs))
     waiting: list[Chunk] = []
-    rows = 0
+    problems: list[Problem] = []
+    rows, anything = 0, False
     for chunk in merged(inputs, session.sensors, options.reorder_s, options.sensor_delay_s):
         waiting.append(chunk)
+        problems += chunk.problems
+        anything = anything or chunk.rows is not None or bool(chunk.channels)
         rows += len(chunk.rows.tau) if chunk.rows is not None else 0
         if options.mode == "realtime" and rows >= (1 if session.setup else HEAD):
-            yield _batch(session, waiting, final=False)
+            yield from _batches(session, waiting, final=False)
             waiting, rows = [], 0
-    yield _batch(session, waiting, final=True)
+    if not anything:
+        raise _nothing_found(session.names, problems)
+    yield from _batches(session, waiting, final=True)
 
 
-def _batch(session: _Session, chunks: list[Chunk], *, final: bool) -> Cleaned:
+def _nothing_found(names: tuple[str, ...], problems: list[Problem]) -> InputError:
+    """Say why there is nothing to clean; the commonest problem is the likeliest reason."""
+    worst = max(problems, key=lambda problem: problem.total, default=None)
+    reason = f": {worst.total} × {worst.kind} ({worst.example})" if worst is not None else ""
+    return InputError(
+        f"{', '.join(names)}: no position and no series found{reason}",
+        "fixes, headings, depths or speeds",
+        worst.remedy if worst is not None else "",
+    )
+
+
+def _batches(session: _Session, chunks: list[Chunk], *, final: bool) -> Iterator[Cleaned]:
+    """Clean what was read, in real time in portions of bounded size."""
     parts = [chunk.rows for chunk in chunks if chunk.rows is not None]
+    rows = join_rows(parts) if parts else None
+    portions: list[Rows | None] = [rows]
+    if session.options.mode == "realtime" and rows is not None and len(rows.tau) > _PORTION:
+        starts = range(0, len(rows.tau), _PORTION)
+        portions = [take_rows(rows, slice(at, at + _PORTION)) for at in starts]
+    first = _batch(session, portions[0], chunks, final=final)
+    yield first
+    for portion in portions[1:]:
+        yield _batch(session, portion, [], final=False)
+
+
+def _batch(session: _Session, rows: Rows | None, chunks: list[Chunk], *, final: bool) -> Cleaned:
+    """Clean one portion of rows, and the series that came with ``chunks``."""
     events = [event for chunk in chunks for event in chunk.events]
     series: dict[tuple[str, str], list[Channel]] = {}
     for chunk in chunks:
+        session.has_depth |= chunk.has_depth
         for channel in chunk.channels:
             series.setdefault((channel.sensor, channel.name), []).append(channel)
-    if parts:
-        cleaned = _clean_rows(session, join_rows(parts), events)
+    if rows is not None:
+        cleaned = _clean_rows(session, rows, events)
     else:
         cleaned = nothing(tuple(session.sensors), session.options, session.setup)
     return replace(
         cleaned,
         sources=session.names,
-        has_depth=any(chunk.has_depth for chunk in chunks),
+        has_depth=session.has_depth,
         channels=_clean_channels(session, series, final=final),
         events=tuple(events),
         problems=tuple(problem for chunk in chunks for problem in chunk.problems),
@@ -114,16 +155,21 @@ def _batch(session: _Session, chunks: list[Chunk], *, final: bool) -> Cleaned:
 def _clean_channels(
     session: _Session, series: dict[tuple[str, str], list[Channel]], *, final: bool
 ) -> tuple[CleanedChannel, ...]:
-    """Clean the series of a batch; with the last batch also what was held back of others."""
-    late = [key for key in session.channels if key not in series] if final else []
+    """Clean the series of a batch; one that just begins waits until there is enough to settle."""
+    for key, parts in series.items():
+        session.arrived.setdefault(key, []).extend(parts)
+    late = [key for key in session.channels if key not in session.arrived] if final else []
     out = []
-    for key in [*series, *late]:
+    for key in [*session.arrived, *late]:
         state = session.channels.get(key, ChannelState())
-        parts = series.get(key) or [state.nothing()]
+        parts = session.arrived.get(key) or [state.nothing()]
         whole = parts[0]._replace(
             time=np.concatenate([part.time for part in parts]),
             value=np.concatenate([part.value for part in parts]),
         )
+        if key not in session.channels and not final and len(whole.time) < 2 * CHANNEL_HEAD:
+            continue
+        session.arrived.pop(key, None)
         cleaned, session.channels[key] = clean_channel(whole, state, session.options, final=final)
         out.append(cleaned)
     return tuple(out)
@@ -131,12 +177,14 @@ def _clean_channels(
 
 def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     """Filter a batch of rows; what is settled with the first batch is added to ``events``."""
-    options, first = session.options, session.setup is None
+    options = session.options
     tau = steady(rows.tau, session.last_tau)
     status = status_of(rows, _repeats(session, rows), held=options.held)
     used = _without_idle(session, rows)
-    setup = session.setup or settle(used, status.verdict < 0, session.sensors, options)
-    if first:
+    setup = session.setup
+    if setup is None:
+        head = _head(options)
+        setup = settle(take_rows(used, head), (status.verdict < 0)[head], session.sensors, options)
         session.setup = setup
         session.filter = start(setup.motion, setup.recovery) if setup.axes else None
         events += [*setup.events, *_idle_events(session)]
@@ -188,13 +236,19 @@ def _all_axes(judged: Verdicts, axes: tuple[int, ...]) -> Verdicts:
 def _repeats(session: _Session, rows: Rows) -> Repeats:
     fixes = rows.fixes
     if session.repeats is None:
+        head, sensors = _head(session.options), len(session.sensors)
         again = np.diff(rows.tau, prepend=np.nan) == 0.0
         positions = np.where(again[:, None], np.nan, fixes.position)
-        session.repeats = start_repeats(positions, fixes.sensor, len(session.sensors))
-        session.idle = constant_axes(fixes.position, fixes.sensor, len(session.sensors))
+        session.repeats = start_repeats(positions[head], fixes.sensor[head], sensors)
+        session.idle = constant_axes(fixes.position[head], fixes.sensor[head], sensors)
     recorded = np.hstack([fixes.position, fixes.velocity])
     repeats, session.repeats = find_repeats(rows.tau, recorded, fixes.sensor, session.repeats)
     return repeats
+
+
+def _head(options: CleanOptions) -> slice:
+    """The rows of the first batch that a log is settled on."""
+    return slice(HEAD if options.mode == "realtime" else None)
 
 
 def _without_idle(session: _Session, rows: Rows) -> Rows:

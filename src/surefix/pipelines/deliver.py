@@ -10,12 +10,13 @@ from pathlib import Path
 
 from surefix.errors import OptionsError
 from surefix.io.writers import SUFFIXES, TrackWriter, channel_writer, resampled_writer, track_writer
-from surefix.pipelines.joining import join
-from surefix.types import Cleaned, CleanedChannel, Event, Track
+from surefix.pipelines.joining import join, thinned
+from surefix.report.headline import counts
+from surefix.types import Cleaned, CleanedChannel, Event, Track, Verdict
 
 __all__ = ["Delivered", "deliver"]
 
-_KEPT = 2_000_000  # rows that are kept for the report and the summary
+_KEPT = 250_000  # rows that are kept for the report and the summary; of more, every k-th
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,15 @@ class Delivered:
     Parameters
     ----------
     cleaned
-        The result; of a log with more than two million rows, its first batches.
+        The result; of a log with more than 250,000 rows every k-th, k a power of two.
+    counts
+        How many fixes had each verdict, all rows counted.
     written
         The files that were written.
     """
 
     cleaned: Cleaned
+    counts: dict[Verdict, int]
     written: tuple[str, ...]
 
 
@@ -62,21 +66,24 @@ def deliver(batches: Iterable[Cleaned], outputs: Sequence[str | Path], *, iso: b
     if len({place.absolute() for place in places}) < len(places):
         raise OptionsError("two outputs of the same name", "different files")
     kept: list[Cleaned] = []
-    rows = 0
+    totals = dict.fromkeys(Verdict, 0)
+    every = 1
     with contextlib.ExitStack() as stack:
         files = _Files(stack, places, iso)
         for batch in batches:
             files.add(batch)
-            if rows <= _KEPT:
-                kept.append(batch)
-            rows += len(batch.track.time)
+            for verdict, total in counts(batch.verdicts).items():
+                totals[verdict] += total
+            kept.append(thinned(batch, every))
+            while len(kept) > 1 and sum(len(part.track.time) for part in kept) > _KEPT:
+                kept, every = [join([thinned(part, 2) for part in kept])], 2 * every
         if not files.written:
             files.add_track(kept[-1])
     whole = join(kept)
-    if len(whole.track.time) < rows:
-        text = f"figures show the first {len(whole.track.time)} of {rows} fixes; the files hold all"
+    if every > 1:
+        text = f"a long log: figures and report show one of {every} fixes, the files hold all"
         whole = replace(whole, events=(Event("note", float("nan"), text), *whole.events))
-    return Delivered(whole, tuple(files.written))
+    return Delivered(whole, totals, tuple(files.written))
 
 
 class _Files:

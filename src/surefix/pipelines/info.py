@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,8 @@ import numpy as np
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import Progress, open_inputs
 from surefix.pipelines.options import CleanOptions, Mode
-from surefix.pipelines.rows import Source
 from surefix.pipelines.summary import span, summary
+from surefix.report.headline import counts as counts_of
 from surefix.types import Cleaned, FloatArray, Log, Verdict, Verdicts
 
 __all__ = ["describe", "info_lines"]
@@ -41,11 +40,11 @@ def describe(
         inputs, columns=columns, require_checksum=require_checksum, progress=progress
     )
     for source in sources:
-        source.logs = _counting(source, counts.setdefault(source.name, {}))
+        source.logs = _counting(source.logs, counts.setdefault(source.name, {}))
     size = sum(Path(path).stat().st_size for path in inputs)
     mode: Mode = "realtime" if size > _LARGE else "offline"
     cleaned = clean_sources(sources, CleanOptions(mode=mode))
-    found = summary(cleaned)
+    found = summary(cleaned, counts_of(cleaned.verdicts))
     return {
         "inputs": list(cleaned.sources),
         "records": counts,
@@ -58,11 +57,12 @@ def describe(
     }
 
 
-def _counting(source: Source, counts: dict[str, int]) -> Iterator[Log]:
-    for log in source.logs:
+def _counting(logs: Iterator[Log], counts: dict[str, int]) -> Iterator[Log]:
+    """Pass logs on and add up their records by kind."""
+    for log in logs:
         for kind, total in log.counts.items():
             counts[kind] = counts.get(kind, 0) + total
-        yield replace(log)
+        yield log
 
 
 def _positions(cleaned: Cleaned) -> list[dict[str, Any]]:

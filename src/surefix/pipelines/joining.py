@@ -9,7 +9,7 @@ import numpy as np
 
 from surefix.types import Cleaned, CleanedChannel, Problem, Track, Verdicts
 
-__all__ = ["join"]
+__all__ = ["join", "thinned"]
 
 
 def join(parts: list[Cleaned]) -> Cleaned:
@@ -36,6 +36,42 @@ def join(parts: list[Cleaned]) -> Cleaned:
         events=tuple(event for part in parts for event in part.events),
         problems=_join_problems(problem for part in parts for problem in part.problems),
     )
+
+
+def thinned(cleaned: Cleaned, every: int) -> Cleaned:
+    """Keep one row of ``every``, of fixes, regular times and series alike."""
+    if every == 1:
+        return cleaned
+    some = slice(None, None, every)
+    return replace(
+        cleaned,
+        track=_some_track(cleaned.track, some),
+        verdicts=_some_verdicts(cleaned.verdicts, some),
+        raw_position=cleaned.raw_position[some],
+        raw_coordinates=cleaned.raw_coordinates[some],
+        sensor=cleaned.sensor[some],
+        row=cleaned.row[some],
+        resampled=None if cleaned.resampled is None else _some_track(cleaned.resampled, some),
+        channels=tuple(
+            channel._replace(
+                time=channel.time[some],
+                raw=channel.raw[some],
+                value=channel.value[some],
+                rate=channel.rate[some],
+                sigma=channel.sigma[some],
+                verdicts=_some_verdicts(channel.verdicts, some),
+            )
+            for channel in cleaned.channels
+        ),
+    )
+
+
+def _some_track(track: Track, some: slice) -> Track:
+    return Track._make(None if column is None else column[some].copy() for column in track)
+
+
+def _some_verdicts(verdicts: Verdicts, some: slice) -> Verdicts:
+    return Verdicts._make(column[some].copy() for column in verdicts)
 
 
 def _join_tracks(tracks: list[Track]) -> Track:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
 from surefix.report.headline import counts, headline
-from surefix.types import Cleaned
+from surefix.types import Cleaned, Verdict
 
 __all__ = ["lines", "span", "summary"]
 
@@ -17,13 +17,17 @@ _CALENDAR_FROM = 1e8  # s; smaller times carry no date
 _TOP_EVENTS = 8
 
 
-def summary(cleaned: Cleaned, written: Sequence[str] = ()) -> dict[str, Any]:
+def summary(
+    cleaned: Cleaned, totals: Mapping[Verdict, int], written: Sequence[str] = ()
+) -> dict[str, Any]:
     """Everything about a result but its rows, ready for JSON: figures that are unknown are null.
 
     Parameters
     ----------
     cleaned
         The result.
+    totals
+        How many fixes had each verdict.
     written
         Files that were written from it.
     """
@@ -32,8 +36,8 @@ def summary(cleaned: Cleaned, written: Sequence[str] = ()) -> dict[str, Any]:
         "surefix": version("surefix"),
         "inputs": list(cleaned.sources),
         "outputs": list(written),
-        "fixes": head.fixes,
-        "verdicts": {verdict.name.lower(): total for verdict, total in head.counts.items()},
+        "fixes": sum(totals.values()),
+        "verdicts": {verdict.name.lower(): total for verdict, total in totals.items()},
         "start": _known(head.start),
         "end": _known(head.end),
         "distance_m": _known(head.distance),
@@ -64,12 +68,16 @@ def summary(cleaned: Cleaned, written: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
-def lines(cleaned: Cleaned, written: Sequence[str] = ()) -> list[str]:
+def lines(
+    cleaned: Cleaned, totals: Mapping[Verdict, int], written: Sequence[str] = ()
+) -> list[str]:
     """Say the same in a few lines of text."""
     head = headline(cleaned)
-    out = [f"{', '.join(cleaned.sources)}: {head.fixes} fixes{span(head.start, head.end)}"]
+    out = [
+        f"{', '.join(cleaned.sources)}: {sum(totals.values())} fixes{span(head.start, head.end)}"
+    ]
     if head.fixes:
-        out.append("  " + _verdicts(cleaned.verdicts))
+        out.append("  " + _verdicts(totals))
         out.append(
             f"  fastest step {_figure(head.raw_speed[1], 'm/s')} before, "
             f"clean track at most {_figure(head.clean_speed[1], 'm/s')}; "
@@ -82,7 +90,7 @@ def lines(cleaned: Cleaned, written: Sequence[str] = ()) -> list[str]:
             f"({figure.source})"
         )
     for channel in cleaned.channels:
-        out.append(f"  {channel.sensor} {channel.name}: {_verdicts(channel.verdicts)}")
+        out.append(f"  {channel.sensor} {channel.name}: {_verdicts(counts(channel.verdicts))}")
     out += [f"  note: {event.text}" for event in cleaned.events[:_TOP_EVENTS]]
     if len(cleaned.events) > _TOP_EVENTS:
         out.append(
@@ -95,9 +103,10 @@ def lines(cleaned: Cleaned, written: Sequence[str] = ()) -> list[str]:
     return out
 
 
-def _verdicts(verdicts: Any) -> str:
-    named = counts(verdicts)
-    return ", ".join(f"{total} {verdict.name.lower()}" for verdict, total in named.items() if total)
+def _verdicts(totals: Mapping[Verdict, int]) -> str:
+    return ", ".join(
+        f"{total} {verdict.name.lower()}" for verdict, total in totals.items() if total
+    )
 
 
 def _known(value: float) -> float | None:
