@@ -35,9 +35,12 @@ def student_t_update(m, P, z, H, R, degrees, sweeps=5):
     """One update with Student-t noise by variational Bayes (Agamennoni, Nieto & Nebot 2012).
 
     The state given the weight λ and λ given the state take turns: λ = (ν + d)/(ν + E), where E is
-    the expectation of (z − Hx)'R⁻¹(z − Hx). Returns m, P and λ, with which a last update is made.
+    the expectation of (z − Hx)'R⁻¹(z − Hx). λ begins at its expectation given the prediction alone.
+    Returns m, P and λ, with which a last update is made.
     """
-    weight = 1.0
+    innovation = z - H @ m
+    square = innovation @ np.linalg.solve(H @ P @ H.T + R, innovation)
+    weight = robust_weights.student_t(square, degrees, z.size)
     for _ in range(sweeps):
         mean, spread = kalman.update(m, P, z, H, R / weight)[:2]
         residual = z - H @ mean
