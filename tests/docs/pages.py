@@ -8,8 +8,8 @@
 ```sh, ```text …      shown only
 ````
 
-In expected output ``…`` stands for any text, and a line ``…`` for any lines. Numbers may differ by a
-tenth, whole numbers below 20 not at all.
+In expected output ``…`` stands for any text, and a line ``…`` for any lines. Numbers may differ
+by a tenth, whole numbers below 20 not at all.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ EXACT_BELOW = 20
 PLAIN = ("head", "tail", "grep", "ls", "sed")  # programs of the system that a page may use
 
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_NUMBER = re.compile(r"(?<![\w.:-])[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?(?![\w:]|-\d)")
+_NUMBER = re.compile(
+    r"(?<![\w.:-])[+-]?(?:\d{1,3}(?:,\d{3})+(?![\d.,])|\d+)(?:\.\d+)?(?:e[+-]?\d+)?(?![\w:]|-\d|\.\d)"
+)
 
 
 class Block(NamedTuple):
@@ -141,7 +143,9 @@ def _pattern(text: str) -> re.Pattern[str]:
             parts.append(r"(?:[^\n]*(?:\n|\Z))*?")
             continue
         quoted = re.escape(line.rstrip()).replace("…", "[^\n]*?")
-        parts.append(re.sub("(?:\\\\)?\0\\d+(?:\\\\)?\0", "(\0\\\\d+\0)", quoted) + r"[ ]*(?:\n|\Z)")
+        parts.append(
+            re.sub("(?:\\\\)?\0\\d+(?:\\\\)?\0", "(\0\\\\d+\0)", quoted) + r"[ ]*(?:\n|\Z)"
+        )
     return re.compile("".join(parts))
 
 

@@ -3,8 +3,8 @@
 import re
 
 import pytest
-from docs.pages import PAGES, ROOT, blocks, run_console, run_page, same
 
+from docs.pages import PAGES, ROOT, blocks, run_console, run_page, same
 from surefix.pipelines.demo import demonstrate
 
 RAW = ("usbl.csv", "depth.csv", "dvl.csv")
