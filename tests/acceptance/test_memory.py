@@ -1,0 +1,74 @@
+"""In real time a log may be larger than the memory."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from acceptance.product import survey
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name != "posix", reason="peak memory is measured the POSIX way"),
+]
+
+MEASURE = """
+import json, resource, sys
+from surefix.cli import main
+sys.argv = ["surefix", *sys.argv[1:]]
+try:
+    main()
+finally:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    sys.stderr.write(json.dumps(peak / (1024 if sys.platform == "linux" else 1 << 20)))
+"""
+BLOCK = 100_000
+
+
+def generate(path, blocks: int) -> None:
+    """A long log at 5 Hz, block by block: the same 100,000 fixes again, later and farther on."""
+    log = survey(BLOCK, interval=0.2)
+    with path.open("w") as file:
+        file.write("time,x,y,z\n")
+        for k in range(blocks):
+            start = k * BLOCK * 0.2
+            moved = np.column_stack(
+                [log["time"] + start, log["x"] + start, log["y"] + 0.3 * start, log["z"]]
+            )
+            np.savetxt(file, moved, fmt="%.2f", delimiter=",")
+
+
+def peak_mb(path, out) -> float:
+    command = [sys.executable, "-c", MEASURE, "clean", str(path), "--mode", "realtime"]
+    done = subprocess.run(
+        [*command, "-o", str(out), "--json"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["fixes"] > 0
+    return float(done.stderr)
+
+
+def test_memory_is_bounded_in_real_time(tmp_path):
+    """Twice the log, the same memory: nothing is kept but what the filter carries.
+
+    The bound holds the libraries (some 250 MB), one block of text and its rows, and the two million
+    rows that are kept for the summary.
+    """
+    peaks = {}
+    for blocks in (10, 20):
+        path, out = tmp_path / "log.csv", tmp_path / "out.csv"
+        generate(path, blocks)
+        peaks[blocks] = peak_mb(path, out)
+        with out.open("rb") as file:
+            assert sum(1 for _ in file) == blocks * BLOCK + 1
+        path.unlink()
+        out.unlink()
+    assert max(peaks.values()) < 700, peaks
+    assert peaks[20] - peaks[10] < 100, peaks

@@ -1,0 +1,167 @@
+"""Whatever breaks, no half-written file stands, an older output stays, and one line says why."""
+
+import gzip
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from acceptance.product import PROGRAM, process, read, surefix, survey, told_in_one_line, write
+
+OLD = "an older output\n"
+ROWS = 20_000
+
+
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("long") / "log.csv", survey(300_000, interval=0.2))
+
+
+@pytest.fixture
+def log(tmp_path):
+    (tmp_path / "in").mkdir()
+    return write(tmp_path / "in" / "log.csv", survey(ROWS))
+
+
+@pytest.fixture
+def out(tmp_path):
+    """A place where an older output stands."""
+    (tmp_path / "out").mkdir()
+    place = tmp_path / "out" / "track.csv"
+    place.write_text(OLD)
+    return place
+
+
+def untouched(out):
+    assert [path.name for path in out.parent.iterdir()] == [out.name]
+    assert out.read_text() == OLD
+
+
+@pytest.mark.parametrize("mode", ["realtime", "offline"])
+def test_truncated_gzip(log, out, mode):
+    packed = log.with_suffix(".csv.gz")
+    content = gzip.compress(log.read_bytes(), compresslevel=1)
+    packed.write_bytes(content[: len(content) // 2])
+    line = told_in_one_line(surefix("clean", packed, "--mode", mode, "-o", out))
+    assert packed.name in line
+    untouched(out)
+
+
+@pytest.mark.parametrize("mode", ["realtime", "offline"])
+def test_a_second_input_that_breaks(log, out, mode):
+    """Batches of the first were already on their way to the disk."""
+    packed = log.with_name("depth.csv.gz")
+    depth = write(log.with_name("depth.csv"), {"time": survey(ROWS)["time"], "depth": 1.0})
+    packed.write_bytes(gzip.compress(depth.read_bytes())[:-200])
+    done = surefix("clean", log, "--depth", packed, "--mode", mode, "-o", out)
+    assert packed.name in told_in_one_line(done)
+    untouched(out)
+
+
+def test_inputs_that_are_none(log, out, tmp_path):
+    binary = tmp_path / "in" / "binary.log"
+    binary.write_bytes(bytes(range(256)) * 100)
+    empty = tmp_path / "in" / "empty.csv"
+    empty.write_bytes(b"")
+    for path in (tmp_path, tmp_path / "nowhere.csv", binary, empty):
+        for command in (("clean", "-o", out), ("info",)):
+            line = told_in_one_line(surefix(*command, path))
+            assert path.name in line
+            untouched(out)
+        assert path.name in told_in_one_line(surefix("clean", log, path, "-o", out))
+        untouched(out)
+
+
+def test_unreadable_input(log, out):
+    if os.geteuid() == 0:
+        pytest.skip("root reads everything")
+    log.chmod(0)
+    assert log.name in told_in_one_line(surefix("clean", log, "-o", out))
+    untouched(out)
+
+
+def test_outputs_that_cannot_be_written(log, out, tmp_path):
+    for place in (tmp_path / "nowhere" / "t.csv", tmp_path / "out.csv", log / "t.csv"):
+        if place.name == "out.csv":
+            place.mkdir()
+        line = told_in_one_line(surefix("clean", log, "-o", out, "-o", place))
+        assert str(place) in line
+        untouched(out)
+    line = told_in_one_line(surefix("clean", log, "-o", "/dev/full"))
+    assert "/dev/full" in line
+
+
+def test_a_second_output_that_fails_leaves_none(log, out):
+    """Metric fixes have no place in GPX: the CSV beside it is not written either."""
+    told_in_one_line(surefix("clean", log, "-o", out, "-o", out.with_suffix(".gpx")))
+    untouched(out)
+
+
+def test_a_report_that_cannot_be_written(log, out, tmp_path):
+    done = surefix("clean", log, "-o", out, "--report", tmp_path / "nowhere" / "r.html")
+    assert "r.html" in told_in_one_line(done)
+    assert sorted(p.name for p in out.parent.iterdir()) == [out.name]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of a process are POSIX")
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("mode", ["realtime", "offline"])
+def test_full_disk(log, out, suffix, mode):
+    """A limit of the file size stands for the disk: the system refuses the rest."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+    place = out.with_suffix(suffix)
+    if place != out:
+        out.rename(place)
+    done = process("clean", log, "--mode", mode, "-o", place, preexec_fn=limit)
+    assert place.name in told_in_one_line(done)
+    untouched(place)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("mode", ["realtime", "offline"])
+def test_interrupted(long_log, out, mode, number):
+    command = [*PROGRAM, "clean", str(long_log), "--mode", mode, "-o", str(out)]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60
+    if mode == "realtime":  # wait until it has begun to write
+        while time.monotonic() < until and len(list(out.parent.iterdir())) == 1:
+            time.sleep(0.005)
+            assert running.poll() is None
+    else:
+        time.sleep(1.2)
+    running.send_signal(number)
+    said, err = running.communicate(timeout=60)
+    assert running.returncode not in (0, None)
+    assert "Traceback" not in err
+    if number == signal.SIGINT:
+        assert running.returncode == 130
+        assert err == "surefix: interrupted\n"
+        assert said == ""
+    untouched(out)
+
+
+def test_an_older_output_is_replaced_whole(log, out):
+    assert process("clean", log, "-o", out).returncode == 0
+    assert len(read(out)) == ROWS
+    assert [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+def test_the_kind_of_interpreter_does_not_matter(log, out):
+    """Without docstrings and assertions it says and writes the same."""
+    done = subprocess.run(
+        [sys.executable, "-OO", *PROGRAM[1:], "clean", str(log), "-o", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(read(out)) == ROWS
