@@ -66,6 +66,8 @@ def lagged(
     """
     time, n = epochs.time, len(epochs.time)
     last = np.searchsorted(time, time + lag, side="right") - 1
+    epochs = epochs._replace(jump=epochs.jump.copy())  # jumps that are dated back are added to it
+    since = np.full((n, motion.groups), np.nan)
     kept = blank(motion, n)
     parts: list[Estimate] = []
     state, head, done = start(motion, recovery), 0, 0
@@ -80,13 +82,18 @@ def lagged(
         ready = max(int(np.searchsorted(last, head - 1)), done)
         parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, ready))
         done = ready
-        begin = max(int(np.searchsorted(time, np.nanmin(kept.since[head - 1]))), done)
-        again = _rows(epochs, begin, head)
-        again = again._replace(jump=again.jump.copy())
-        again.jump[0] |= jumped
+        began = kept.since[head - 1].copy()
+        first = np.maximum(np.searchsorted(time, began), done)
+        for g in np.flatnonzero(np.isfinite(began)):
+            epochs.jump[first[g]] |= 1 << g
+            since[first[g], g] = began[g]
+        begin = int(first[np.isfinite(began)].min())
         before = _state_before(motion, recovery, time, kept, begin, state)
-        state, redo, count = filter_track(motion, loss, recovery, again, before)
+        again = _rows(epochs, begin, head)
+        redone, redo, count = filter_track(motion, loss, recovery, again, before)
         _write(kept, begin, redo, count)
+        kept.since[begin:head] = np.fmin(kept.since[begin:head], since[begin:head])
+        state = _remembering(motion, redone, state, jumped)
     parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, n))
     return Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
@@ -139,8 +146,34 @@ def _state_before(
     now: TrackState,
 ) -> TrackState:
     """The filter's state just before epoch ``begin``, from what it kept."""
+    begun = start(motion, recovery)
     if begin == 0:
-        return start(motion, recovery)
+        return begun
     return now._replace(
-        time=float(time[begin - 1]), mean=kept.mean[begin - 1], factor=kept.factor[begin - 1]
+        time=float(time[begin - 1]),
+        mean=kept.mean[begin - 1],
+        factor=kept.factor[begin - 1],
+        streak=begun.streak,
     )
+
+
+def _remembering(motion: Motion, redone: TrackState, now: TrackState, jumped: int) -> TrackState:
+    """The state after a stretch was filtered again, as long in memory as that before it.
+
+    A run of rejections that is older than the stretch goes on; nothing is counted twice.
+    """
+    kept = redone._replace(
+        settled=redone.settled.copy(),
+        streak=redone.streak.copy(),
+        since=redone.since.copy(),
+        recent=redone.recent.copy(),
+    )
+    for g in range(motion.groups):
+        if (jumped >> g) & 1:
+            continue
+        kept.settled[g] = min(redone.settled[g], now.settled[g])
+        if 0 < redone.streak[g] < now.streak[g]:
+            columns = motion.group == g
+            kept.streak[g], kept.since[g] = now.streak[g], now.since[g]
+            kept.recent[:, columns] = now.recent[:, columns]
+    return kept
