@@ -16,6 +16,9 @@ from surefix.io.nmea_record import ProblemKind
 from surefix.io.nmea_sentence import LAYOUTS
 from surefix.io.options_file import read_options
 from surefix.io.roles import ALIASES, ROLES, UNITS
+from surefix.pipelines import deliver
+from surefix.pipelines.channels import CHANNEL_HEAD
+from surefix.pipelines.clean import HEAD
 from surefix.reasons import texts
 from surefix.robust.loss import LOSSES, loss_named
 from surefix.types import Reason, Verdict, Verdicts
@@ -181,6 +184,13 @@ def test_modules_that_are_named_exist():
     text = (DOCS / "reference/python.md").read_text(encoding="utf-8")
     for name in re.findall(r"^\| `(surefix\.[\w.]+)` \|", text, re.MULTILINE):
         importlib.import_module(name)
+
+
+def test_figures_in_the_how_to_are_those_of_the_code():
+    text = (DOCS / "how-to.md").read_text(encoding="utf-8")
+    assert f"first {HEAD:,}\nrows" in text
+    assert f"({CHANNEL_HEAD:,} values" in text
+    assert f"more than {deliver._KEPT:,}" in text
 
 
 def test_losses_of_the_explanation_are_those_of_the_code():
