@@ -182,8 +182,7 @@ def test_jumps_of_two_groups_are_each_dated_back(method, gap):
             assert found.since[150 + later, 1] == epochs.time[150 + later]
 
 
-def test_a_stretch_filtered_again_is_not_counted_twice():
-    """Velocities rejected before and during a recovery of the position wait their full time."""
+def test_velocities_rejected_while_the_position_recovers_wait_their_full_time():
     _, epochs, motion = jumped(0, 500.0, velocity=0.1)
     epochs.z[175:200, 2:] += 50.0
     found = lagged(motion, loss_named("igg3"), RECOVERY, epochs, 60.0, everywhere(epochs))

@@ -90,10 +90,9 @@ def lagged(
         begin = int(first[np.isfinite(began)].min())
         before = _state_before(motion, recovery, time, kept, begin, state)
         again = _rows(epochs, begin, head)
-        redone, redo, count = filter_track(motion, loss, recovery, again, before)
+        state, redo, count = filter_track(motion, loss, recovery, again, before)
         _write(kept, begin, redo, count)
         kept.since[begin:head] = np.fmin(kept.since[begin:head], since[begin:head])
-        state = _remembering(motion, redone, state, jumped)
     parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, n))
     return Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
@@ -146,34 +145,8 @@ def _state_before(
     now: TrackState,
 ) -> TrackState:
     """The filter's state just before epoch ``begin``, from what it kept."""
-    begun = start(motion, recovery)
     if begin == 0:
-        return begun
+        return start(motion, recovery)
     return now._replace(
-        time=float(time[begin - 1]),
-        mean=kept.mean[begin - 1],
-        factor=kept.factor[begin - 1],
-        streak=begun.streak,
+        time=float(time[begin - 1]), mean=kept.mean[begin - 1], factor=kept.factor[begin - 1]
     )
-
-
-def _remembering(motion: Motion, redone: TrackState, now: TrackState, jumped: int) -> TrackState:
-    """The state after a stretch was filtered again, as long in memory as that before it.
-
-    A run of rejections that is older than the stretch goes on; nothing is counted twice.
-    """
-    kept = redone._replace(
-        settled=redone.settled.copy(),
-        streak=redone.streak.copy(),
-        since=redone.since.copy(),
-        recent=redone.recent.copy(),
-    )
-    for g in range(motion.groups):
-        if (jumped >> g) & 1:
-            continue
-        kept.settled[g] = min(redone.settled[g], now.settled[g])
-        if 0 < redone.streak[g] < now.streak[g]:
-            columns = motion.group == g
-            kept.streak[g], kept.since[g] = now.streak[g], now.since[g]
-            kept.recent[:, columns] = now.recent[:, columns]
-    return kept
