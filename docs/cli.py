@@ -56,6 +56,8 @@ def _table(function: Callable[..., Any]) -> str:
     hints = get_type_hints(function, include_extras=True)
     rows = ["| option | value | meaning |", "|---|---|---|"]
     for name, parameter in inspect.signature(function).parameters.items():
+        if not get_args(hints[name]):  # the context, which is no option
+            continue
         kind, info = get_args(hints[name])[:2]
         rows.append(f"| {_names(name, info)} | {_value(kind, info)} | {_help(parameter, info)} |")
     return "\n".join(rows) + "\n"
