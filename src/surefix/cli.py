@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.exceptions import TyperException
 
 from surefix.errors import OptionsError, SurefixError
 
@@ -23,12 +25,13 @@ __all__ = ["app", "clean", "demo", "info", "main"]
 app = typer.Typer(
     name="surefix",
     help="Turn logs full of wild position fixes into a sure track, with a verdict for every fix.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 
+_INTERRUPTED = 130
+_TERMINATED = 143
 _SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
@@ -50,6 +53,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 @app.callback(invoke_without_command=True)
 def _root(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
@@ -57,6 +61,8 @@ def _root(
 
         typer.echo(installed("surefix"))
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 @app.command()
@@ -153,7 +159,8 @@ def clean(
     )
     if report is not None:
         _check_report(report)
-    files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
+    files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
+    _keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with _progress(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
@@ -217,15 +224,23 @@ def demo(
 def main() -> None:
     """Run the command line; every failure ends with one line and a non-zero exit."""
     _use_utf8()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))  # unfinished files are removed
     try:
-        app()
+        code = app(standalone_mode=False)
+        if code == _INTERRUPTED:
+            _fail("interrupted", _INTERRUPTED)
+        sys.exit(code if isinstance(code, int) else 0)
+    except TyperException as error:
+        _fail(f"{error.format_message()} (surefix --help lists commands and options)", 2)
+    except typer.Abort:
+        _fail("interrupted", _INTERRUPTED)
     except SurefixError as error:
         _fail(str(error), 1)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(141)
     except KeyboardInterrupt:
-        _fail("interrupted", 130)
+        _fail("interrupted", _INTERRUPTED)
     except Exception as error:
         if os.environ.get("SUREFIX_DEBUG"):
             raise
@@ -271,6 +286,14 @@ def _seconds(option: str, text: str | None) -> float | None:
     except ValueError:
         pass
     raise OptionsError(f"{option} {text!r}", "a duration such as 0.5s, 200ms or 2min")
+
+
+def _keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
+    """Refuse to write over what is read."""
+    read = {path.resolve() for path in inputs}
+    for path in outputs:
+        if path.resolve() in read:
+            raise OptionsError(f"output {path} is also an input", "another name")
 
 
 def _check_report(path: Path) -> None:

@@ -20,6 +20,7 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "start_repeats"]
 
 _GRAINS = 4.0  # a hold is believed where positions usually change by at least so many grains
+_COPIES = 10  # copies on end that are believed to be held; a vessel may have come to rest
 _CHANGES = 5  # the latest changes, whose median counts
 _IDLE_MIN = 10  # fixes that show an axis to be idle
 _STRETCH = 50  # successive fixes whose steps are compared with their repetitions
@@ -35,6 +36,7 @@ class _Sensor(NamedTuple):
     changes: FloatArray
     position: FloatArray
     since: float
+    copies: int
     epoch: FloatArray
 
 
@@ -152,7 +154,7 @@ def _learn(position: FloatArray) -> _Sensor:
     usual = float(np.median(changes)) if changes.size else 0.0
     blank = np.full(axes, np.nan)
     polled = axes > 1 and _is_polled(steps)
-    return _Sensor(grain, polled, np.full(_CHANGES, usual), blank, np.nan, np.empty((0, 0)))
+    return _Sensor(grain, polled, np.full(_CHANGES, usual), blank, np.nan, 0, np.empty((0, 0)))
 
 
 def _is_polled(steps: FloatArray) -> bool:
@@ -227,11 +229,16 @@ def _same_position(
     grains = _in_grains(np.abs(two - one), past.grain)[compared]
     changes = np.concatenate((past.changes, grains))
     usual = np.median(sliding_window_view(changes, _CHANGES), axis=1)
-    held[rows] = same & (past.polled | (usual[np.cumsum(compared)] >= _GRAINS))
+    copies = np.arange(1, rows.size + 1) - run + np.where(run == 0, past.copies, 0)
+    still = (usual[np.cumsum(compared)] >= _GRAINS) & (copies <= _COPIES)
+    held[rows] = same & (past.polled | still)
     return (
         held,
         since,
         past._replace(
-            changes=changes[-_CHANGES:], position=position[-1], since=float(begun[run[-1]])
+            changes=changes[-_CHANGES:],
+            position=position[-1],
+            since=float(begun[run[-1]]),
+            copies=int(copies[-1]),
         ),
     )

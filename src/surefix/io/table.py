@@ -154,7 +154,9 @@ def _csv(
                     "row", rows.bad, rows.example, "look at the line; its time was kept"
                 )
             if block.cut:
-                converter.count("truncated", 1, "the gzip data break off", "fetch the file again")
+                raise InputError(
+                    f"{path}: the gzip data break off", "a whole file", "fetch it again"
+                )
             named = {int(name): table.column(name) for name in table.column_names}
             place = _place(block)
             yield converter.log(named, table.num_rows, place)

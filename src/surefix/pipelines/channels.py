@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +31,8 @@ CHANNEL_HEAD = 2000
 
 _RECOVERY_VALUES = 30
 _LAG_VALUES = 20
+_LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
+_LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
 _UNKNOWN = 1e5  # a standard deviation from here on means that nothing is known
 
 
@@ -67,7 +68,8 @@ def clean_channel(
         From the part before. Noise is estimated on the head of the first part, in real time on its
         first `CHANNEL_HEAD` values: twice as many should come before it is begun.
     options
-        Mode and method; noise figures of positions do not apply.
+        Mode and method; noise figures of positions do not apply, and ``auto`` is the ``cv`` model,
+        which runs away least where a series has lost its sensor.
     final
         True with the last part.
     """
@@ -95,7 +97,6 @@ def clean_channel(
     status.mark(repaired.late, Verdict.REJECTED, Reason.LATE)
     status.mark(~np.isfinite(raw), Verdict.MISSING, Reason.NO_VALUE)
     status.mark(found.repeated, Verdict.DUPLICATE, Reason.REPEATED)
-    status.mark(found.held & options.held, Verdict.DUPLICATE, Reason.HELD)
     status.detail[status.verdict == Verdict.DUPLICATE] = found.first[
         status.verdict == Verdict.DUPLICATE
     ]
@@ -122,7 +123,8 @@ def clean_channel(
         state.filter,
     )
     judged = verdicts(estimated, epochs, state.motion, status)
-    known = estimated.sigma[:, 0] < _UNKNOWN
+    lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
+    known = (estimated.sigma[:, 0] < _UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
     cleaned = CleanedChannel(
         name=new.name,
@@ -156,18 +158,10 @@ def _settle(
         tau[seen], values, np.zeros(seen.sum(), np.int64), np.full_like(values, np.nan)
     )
     unknown = NoiseFigures(np.array([np.nan]), np.array([np.nan]), np.nan)
-    tried = {
-        model: estimate_noise(
-            observations,
-            unknown,
-            order=MODELS[model],
-            period=new.period,
-            quantum=grain(z[seen]),
-        )
-        for model in replace(options, process=None).models
-    }
-    model = min(tried, key=lambda name: tried[name].cost)
-    figures, order = tried[model], MODELS[model]
+    order = MODELS["cv" if options.model == "auto" else options.model]
+    figures = estimate_noise(
+        observations, unknown, order=order, period=new.period, quantum=grain(z[seen])
+    )
     steps = np.diff(tau[seen])
     steps = steps[steps > 0.0]
     interval = float(np.median(steps)) if len(steps) else 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, Literal, get_args
@@ -75,23 +75,26 @@ class CleanOptions:
     held: bool = True
 
     def __post_init__(self) -> None:
-        if self.mode not in get_args(Mode):
-            raise OptionsError(f"mode {self.mode!r}", "one of " + ", ".join(get_args(Mode)))
-        if self.method not in LOSSES:
-            raise OptionsError(f"method {self.method!r}", "one of " + ", ".join(LOSSES))
-        if self.model not in (*MODELS, "auto"):
-            raise OptionsError(f"model {self.model!r}", "one of auto, " + ", ".join(MODELS))
-        figures = {f.name: getattr(self, f.name) for f in fields(self)}
-        figures |= {f"sigma of sensor {name!r}": v for name, v in self.sensor_sigma.items()}
+        _one_of("mode", self.mode, get_args(Mode))
+        _one_of("method", self.method, LOSSES)
+        _one_of("model", self.model, (*MODELS, "auto"))
         for name in _POSITIVE:
-            _positive(name, figures[name])
-        for name, value in self.sensor_sigma.items():
-            _positive(f"sigma of sensor {name!r}", value)
-        for name, value in self.sensor_delay_s.items():
-            if not math.isfinite(_number(f"delay of sensor {name!r}", value)):
-                raise OptionsError(f"delay of sensor {name!r} = {value}", "finite seconds")
-        if not (math.isfinite(self.reorder_s) and self.reorder_s >= 0.0):
+            _positive(name, getattr(self, name))
+        for name in ("sensor_sigma", "sensor_delay_s"):
+            if not isinstance(getattr(self, name), Mapping):
+                raise OptionsError(f"{name} = {getattr(self, name)!r}", "figures by sensor name")
+        for sensor, value in self.sensor_sigma.items():
+            _positive(f"sigma of sensor {sensor!r}", value)
+        for sensor, value in self.sensor_delay_s.items():
+            _number(f"delay of sensor {sensor!r}", value)
+        for name in ("k0", "k1"):
+            if getattr(self, name) is not None:
+                _number(name, getattr(self, name))
+        _number("false_alarm", self.false_alarm)
+        if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
+        if not isinstance(self.held, bool):
+            raise OptionsError(f"held = {self.held!r}", "true or false")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
 
     @property
@@ -118,17 +121,19 @@ _POSITIVE = (
 )
 
 
+def _one_of(name: str, value: object, known: Iterable[str]) -> None:
+    if not isinstance(value, str) or value not in known:
+        raise OptionsError(f"{name} {value!r}", "one of " + ", ".join(known))
+
+
 def _positive(name: str, value: object) -> None:
-    if value is None:
-        return
-    number = _number(name, value)
-    if not (math.isfinite(number) and number > 0.0):
-        raise OptionsError(f"{name} = {number}", "a finite number above zero")
+    if value is not None and _number(name, value) <= 0.0:
+        raise OptionsError(f"{name} = {value}", "a finite number above zero")
 
 
 def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise OptionsError(f"{name} = {value!r}", "a number")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise OptionsError(f"{name} = {value!r}", "a finite number")
     return float(value)
 
 
