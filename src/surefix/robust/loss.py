@@ -19,6 +19,7 @@ student-t  (ν+m)/(ν+d²), iterated          degrees of freedom ν in place of 
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -128,6 +129,8 @@ def loss_named(
     if code == LossCode.GATE:
         high = float(chdtri(1, false_alarm) ** 0.5)
     low, high = (low if k0 is None else k0), (high if k1 is None else k1)
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise OptionsError(f"k0 = {low}, k1 = {high}", "finite numbers of standard deviations")
     if low < 0.0 or (code == LossCode.STUDENT_T and low <= 0.0):
         raise OptionsError(f"k0 = {low}", "a positive number of standard deviations")
     if code in (LossCode.IGG1, LossCode.IGG3, LossCode.IGG3_YANG) and not low < high:
