@@ -122,6 +122,18 @@ def test_smooth_motion_is_not_taken_for_noise(sigma, rate, gross, velocity):
         assert np.median([f.velocity[0] for f in found]) == pytest.approx(velocity, rel=0.15)
 
 
+@pytest.mark.xfail(reason="the search begins too far away and ends at a local optimum")
+def test_a_fast_turning_vessel_with_sparse_fixes_and_many_gross_errors():
+    """The likelihood is right, 1300 nats better at the truth; the search does not get there."""
+    found = [
+        estimate_noise(
+            surveyed(seed, sigma=0.05, rate=0.2, gross=0.2, n=1000), UNKNOWN, order=3
+        ).position[0]
+        for seed in range(3)
+    ]
+    assert np.median(found) == pytest.approx(0.05, rel=0.2)
+
+
 def test_the_likelihood_tells_the_models_apart():
     votes = []
     for seed in range(4):
