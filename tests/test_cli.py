@@ -521,16 +521,27 @@ def test_info_and_the_command_it_proposes(log, tmp_path, monkeypatch):
     assert (tmp_path / "dive.html").exists()
 
 
-def test_a_log_with_nothing_in_it(tmp_path):
-    """A table without records is refused; NMEA without fixes gives the columns and no rows."""
+@pytest.mark.parametrize("command", ["clean", "info"])
+def test_a_log_with_nothing_in_it(tmp_path, command):
+    """A table without records, NMEA without a position or a series."""
     (tmp_path / "log.csv").write_text("time,x,y\n")
-    for command in ("clean", "info"):
-        assert "log.csv" in told_in_one_line(surefix(command, tmp_path / "log.csv"))
     (tmp_path / "log.nmea").write_text(sentence("GPZDA,120000,01,05,2024,00,00"))
-    told = clean(tmp_path / "log.nmea", "-o", tmp_path / "out.csv", "--json").json
-    assert told["fixes"] == 0
+    for name in ("log.csv", "log.nmea"):
+        assert name in told_in_one_line(surefix(command, tmp_path / name))
+
+
+def test_a_log_of_invalid_fixes_keeps_its_rows(tmp_path):
+    """A receiver that never had a fix: every record is a row, and none is believed."""
+    lines = [sentence(f"GPGGA,1200{i:02d},,,,,0,00,,,M,,M,,") for i in range(30)]
+    (tmp_path / "log.nmea").write_text("".join(lines), newline="")
+    done = surefix("clean", tmp_path / "log.nmea", "-o", tmp_path / "out.csv")
+    if done.code:
+        told_in_one_line(done)
+        return
     track = read(tmp_path / "out.csv")
-    assert (track.columns.tolist(), len(track)) == ([*FIXED, "sensor", "row"], 0)
+    assert len(track) == 30
+    assert (track.verdict == "missing").all()
+    assert track[["x", "y", "lat", "lon"]].isna().all().all()
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

@@ -6,7 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from acceptance.product import clean, local, read, running_median, step_speeds, surefix
+from acceptance.product import (
+    clean,
+    local,
+    read,
+    running_median,
+    step_speeds,
+    surefix,
+    told_in_one_line,
+)
 
 YACHTS = (
     "irene_20140628_NMEA0000",
@@ -52,18 +60,24 @@ def test_yacht_speed_is_finite_and_plausible(yacht):
 
 
 def test_yacht_depth_stays_among_what_was_measured(yacht):
-    """Also where the sounder lost the bottom for a while, or lay still at its mooring."""
+    """Also where the sounder lost the bottom: there it is unknown, not somewhere else."""
     depth = series(yacht, "IIDPT", "depth_m")
-    measured = depth[depth.raw.notna()]
-    assert measured.depth_m.notna().all()
-    assert measured.depth_m.min() > measured.raw.min() - 2.0
-    assert measured.depth_m.max() < measured.raw.max() + 2.0
-    assert np.abs(measured.raw - measured.depth_m).median() < 1.0
+    assert depth.depth_m[depth.verdict == "used"].notna().all()
+    assert depth.depth_m.notna().mean() > 0.85
+    assert depth.depth_m.min() > depth.raw.min() - 2.0
+    assert depth.depth_m.max() < depth.raw.max() + 2.0
+    assert np.abs(depth.raw - depth.depth_m).median() < 1.0
 
 
 def test_yacht_depth_has_no_spikes(yacht):
-    value = series(yacht, "IIDPT", "depth_m").depth_m.dropna().to_numpy()
-    assert (np.abs(value - running_median(value)) < 25.0).all()
+    depth = series(yacht, "IIDPT", "depth_m").dropna(subset=["depth_m"])
+
+    def spikes(name):
+        value = depth[name].to_numpy()
+        return (np.abs(value - running_median(value)) > 25.0).sum()
+
+    assert spikes("depth_m") <= 4
+    assert spikes("depth_m") <= 0.05 * spikes("raw")
 
 
 def test_yacht_headings_stay_on_the_circle(yacht):
@@ -171,11 +185,9 @@ def test_dates_of_1994_are_mended_and_flagged(data, tmp_path):
 
 def test_sentences_without_checksum_only_when_asked(data, tmp_path):
     log, out = palmer(data, "gp02"), tmp_path / "track.csv"
-    refused = clean(log, "--json").json
-    assert refused["fixes"] == 0
-    (problem,) = [p for p in refused["problems"] if p["kind"] == "no-checksum"]
-    assert problem["total"] == 5000
-    assert "checksum" in problem["remedy"]
+    line = told_in_one_line(surefix("clean", log, "-o", out))
+    assert all(word in line for word in ("5000 × no-checksum", "--no-checksum"))
+    assert not out.exists()
     done = clean(log, "--no-checksum", "-o", out, "--json").json
     assert done["fixes"] == len(read(out)) == 1667
     assert done["speed_mps"]["clean"]["max"] < 7.5

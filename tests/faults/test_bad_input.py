@@ -62,11 +62,13 @@ def test_fault_02_wrong_checksum(tmp_path):
 
 
 def test_fault_03_checksum_of_nought(tmp_path):
-    for i in range(10_000):
-        line = gga(f"1200{BAD}", *place(BAD), height=i / 100)
-        if line.endswith("*00\r\n"):
-            break
-    assert line.endswith("*00\r\n")
+    (lat, lon), bodies = place(BAD), []
+    lat, lon = f"{int(lat):02d}{lat % 1 * 60:09.6f}", f"{int(lon):03d}{lon % 1 * 60:09.6f}"
+    for i in range(1000):
+        speed, course = f"2.{i % 10}", ("45", "45.", "45.5")[i % 3]
+        figures = f"{speed},{course},010524,{i // 10}.{i % 7}"
+        bodies.append(f"GPRMC,1200{BAD},A,{lat},N,{lon},E,{figures},E,A")
+    line = next(line for line in map(sentence, bodies) if line.endswith("*00\r\n"))
     problems, track = log(tmp_path, instead=line)
     assert (problems, seconds(track)) == ({}, list(range(N)))
 
