@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from surefix.pipelines.clean import clean_sources
-from surefix.pipelines.inputs import open_frames, open_inputs
+from surefix.pipelines.inputs import Data, open_inputs
 from surefix.pipelines.options import CleanOptions
 from surefix.types import Cleaned
 
@@ -16,16 +15,13 @@ if TYPE_CHECKING:
 
 __all__ = ["clean", "to_table"]
 
-Data = Any
-"""A file, several files, or a table: a data frame, an Arrow table, a mapping of names to arrays."""
-
 
 def clean(
     data: Data,
     *,
-    depth: Data = None,
-    velocity: Data = None,
-    heading: Data = None,
+    depth: Data | None = None,
+    velocity: Data | None = None,
+    heading: Data | None = None,
     columns: Mapping[str, str] | None = None,
     options: CleanOptions | None = None,
 ) -> Cleaned:
@@ -36,7 +32,8 @@ def clean(
     data
         Fixes: ``time`` (s or ISO 8601), ``x, y, z`` (m, z up) or ``lat, lon`` and ``depth`` or
         ``height``, optionally velocities and standard deviations. A path or several, or a table
-        (pandas, Polars, Arrow, a mapping of names to arrays). It is not modified.
+        (pandas, Polars, Arrow, a mapping of names to arrays), or a list of such. Nothing of it is
+        modified.
     depth, velocity, heading
         Other sensors, each of the same kinds, with their own clocks and rates.
     columns
@@ -55,23 +52,15 @@ def clean(
     >>> cleaned.track.position.shape
     (4, 3)
     """
-    chosen = options or CleanOptions()
-    if _is_files(data):
-        paths = [data] if isinstance(data, str | Path) else list(data)
-        sources = open_inputs(
-            paths, depth=depth, velocity=velocity, heading=heading, columns=columns
-        )
-    else:
-        sources = open_frames(
-            data, depth=depth, velocity=velocity, heading=heading, columns=columns
-        )
-    return clean_sources(sources, chosen)
-
-
-def _is_files(data: Data) -> bool:
-    if isinstance(data, str | Path):
-        return True
-    return isinstance(data, Sequence) and all(isinstance(item, str | Path) for item in data)
+    several = isinstance(data, Sequence) and not isinstance(data, str)
+    sources = open_inputs(
+        list(data) if several else [data],
+        depth=depth,
+        velocity=velocity,
+        heading=heading,
+        columns=columns,
+    )
+    return clean_sources(sources, options or CleanOptions())
 
 
 def to_table(cleaned: Cleaned) -> pa.Table:

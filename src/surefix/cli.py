@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.exceptions import TyperException
@@ -45,6 +45,13 @@ Columns = Annotated[
         help="What a column means, such as time=lcm_timestamp:us or z=-depth; repeatable.",
     ),
 ]
+Depth = Annotated[Path | None, typer.Option(help="Log of a depth sensor that supports the fixes.")]
+Velocity = Annotated[
+    Path | None, typer.Option(help="Log of a velocity sensor that supports the fixes.")
+]
+Heading = Annotated[
+    Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
+]
 NoChecksum = Annotated[
     bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
 ]
@@ -77,15 +84,16 @@ def clean(
         ),
     ] = None,
     mode: Annotated[
-        str | None, typer.Option(help="realtime, lagged or offline (the default).")
+        Literal["realtime", "lagged", "offline"] | None,
+        typer.Option(help="How much of the log each fix is judged by; default offline, all of it."),
     ] = None,
     method: Annotated[
-        str | None,
-        typer.Option(help="kalman, gate, huber, igg1, igg3 (the default), igg3-yang or student-t."),
+        Literal["kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t"] | None,
+        typer.Option(help="The robust loss; default igg3."),
     ] = None,
     model: Annotated[
-        str | None,
-        typer.Option(help="Motion: cv, constant velocity; ca, acceleration; auto (the default)."),
+        Literal["auto", "cv", "ca"] | None,
+        typer.Option(help="Motion: constant velocity or acceleration; default auto, the likelier."),
     ] = None,
     k0: Annotated[float | None, typer.Option(help="Where down-weighting begins, in σ.")] = None,
     k1: Annotated[float | None, typer.Option(help="Where rejection begins, in σ.")] = None,
@@ -115,15 +123,9 @@ def clean(
         str | None,
         typer.Option(metavar="DURATION", help="Write the track at regular times, such as 0.5s."),
     ] = None,
-    depth: Annotated[
-        Path | None, typer.Option(help="Log of a depth sensor that supports the fixes.")
-    ] = None,
-    velocity: Annotated[
-        Path | None, typer.Option(help="Log of a velocity sensor that supports the fixes.")
-    ] = None,
-    heading: Annotated[
-        Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
-    ] = None,
+    depth: Depth = None,
+    velocity: Velocity = None,
+    heading: Heading = None,
     column: Columns = None,
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
@@ -185,6 +187,9 @@ def clean(
 @app.command()
 def info(
     inputs: Inputs,
+    depth: Depth = None,
+    velocity: Velocity = None,
+    heading: Heading = None,
     column: Columns = None,
     no_checksum: NoChecksum = False,
     as_json: AsJson = False,
@@ -193,9 +198,13 @@ def info(
     from surefix.io.columns import mapping
     from surefix.pipelines.info import describe, info_lines
 
-    with _progress(inputs, quiet=as_json) as told:
+    files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
+    with _progress(files, quiet=as_json) as told:
         found = describe(
             inputs,
+            depth=depth,
+            velocity=velocity,
+            heading=heading,
             columns=mapping(column or []),
             require_checksum=not no_checksum,
             progress=told,
@@ -231,7 +240,8 @@ def main() -> None:
             _fail("interrupted", _INTERRUPTED)
         sys.exit(code if isinstance(code, int) else 0)
     except TyperException as error:
-        _fail(f"{error.format_message()} (surefix --help lists commands and options)", 2)
+        said = error.format_message().replace("Value error, ", "")
+        _fail(f"{said} (surefix --help lists commands and options)", 2)
     except typer.Abort:
         _fail("interrupted", _INTERRUPTED)
     except SurefixError as error:

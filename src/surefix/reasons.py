@@ -13,12 +13,10 @@ _CALENDAR_FROM = 1e8  # s; smaller times count from the start of a log and carry
 
 _FIXED = {
     Reason.AGREES: "agrees",
-    Reason.FIRST: "the track starts here",
     Reason.NO_POSITION: "no position",
     Reason.NO_VALUE: "no value",
     Reason.NO_TIME: "no time",
     Reason.INVALID: "marked invalid by the sensor",
-    Reason.IMPLAUSIBLE: "not a possible position",
     Reason.ACCEPTED_BY_USER: "accepted by the user",
     Reason.REJECTED_BY_USER: "rejected by the user",
 }
@@ -49,8 +47,6 @@ def _text(reason: int, verdict: int, weight: float, sigma: float, detail: float)
             return f"{sigma:.1f} σ off {_BLOCKS[int(detail)]}, the rest used"
         case Reason.JUMP:
             return f"jump accepted, dated back to {clock(detail)}"
-        case Reason.RESTART:
-            return f"the track starts anew after {detail:.0f} s without a fix"
         case Reason.REPEATED:
             return f"the same record again, first at {clock(detail)}"
         case Reason.HELD:

@@ -150,7 +150,8 @@ class Event(NamedTuple):
     Parameters
     ----------
     kind
-        ``gap``, ``clock-step``, ``week-rollover``, ``jump``, ``recovery``, ``held``, ``note`` …
+        ``gap``, ``clock-step``, ``misdated``, ``week-rollover``, ``jump``, ``held``, ``idle-axis``,
+        ``height-offset`` or ``note``.
     time
         s on the output's clock; NaN where it concerns the whole log.
     text
@@ -186,21 +187,18 @@ class Reason(IntEnum):
     """Why a verdict was given; `surefix.reasons.texts` turns it into a sentence."""
 
     AGREES = 0
-    FIRST = 1
-    OFF = 2
-    AXIS_OFF = 3
-    JUMP = 4
-    RESTART = 5
-    NO_POSITION = 6
-    NO_TIME = 7
-    INVALID = 8
-    IMPLAUSIBLE = 9
-    REPEATED = 10
-    HELD = 11
-    LATE = 12
-    ACCEPTED_BY_USER = 13
-    REJECTED_BY_USER = 14
-    NO_VALUE = 15
+    OFF = 1
+    AXIS_OFF = 2
+    JUMP = 3
+    NO_POSITION = 4
+    NO_VALUE = 5
+    NO_TIME = 6
+    INVALID = 7
+    REPEATED = 8
+    HELD = 9
+    LATE = 10
+    ACCEPTED_BY_USER = 11
+    REJECTED_BY_USER = 12
 
 
 class Verdicts(NamedTuple):
@@ -222,7 +220,7 @@ class Verdicts(NamedTuple):
         (n,) codes of `Reason`.
     detail
         (n,) the figure that goes with the reason: a time in s (JUMP, HELD, LATE: the time it refers
-        to), a duration in s (RESTART) or an axis mask (AXIS_OFF: bit 0 horizontal, bit 1 vertical).
+        to) or an axis mask (AXIS_OFF: bit 0 horizontal, bit 1 vertical).
     """
 
     verdict: IntArray

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import filter_track, start
 from surefix.robust.loss import loss_named
-from surefix.types import FloatArray, IntArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "NoiseFigures",
@@ -201,7 +201,7 @@ def _thin(observations: Observations) -> Observations:
     keep = np.zeros(len(present), dtype=np.bool_)
     if len(sensors):
         each = _SAMPLE // len(sensors)
-        slow = sensors[int(np.argmin(counts))]
+        slow = sensors[_base(observations.time, present, observations.sensor, sensors, counts)]
         slowest = np.flatnonzero(present & (observations.sensor == slow))
         spans = _blocks(slowest, each)
         for sensor in sensors:
@@ -214,6 +214,15 @@ def _thin(observations: Observations) -> Observations:
         observations.sensor[keep],
         observations.declared[keep],
     )
+
+
+def _base(
+    time: FloatArray, present: BoolArray, sensor: IntArray, sensors: IntArray, counts: IntArray
+) -> int:
+    """Which of the sensors that last for most of the log is the slowest."""
+    lasts = [np.ptp(time[present & (sensor == s)]) for s in sensors]
+    steady = np.asarray(lasts) >= 0.5 * max(lasts)
+    return int(np.argmin(np.where(steady, counts, np.inf)))
 
 
 def _blocks(rows: IntArray, size: int) -> list[tuple[int, int]]:

@@ -23,7 +23,14 @@ from surefix.filters.records import TrackState
 from surefix.filters.track import start
 from surefix.pipelines.channels import CHANNEL_HEAD, ChannelState, clean_channel
 from surefix.pipelines.joining import join
-from surefix.pipelines.judge import estimate, join_status, unjudged, verdicts, without_position
+from surefix.pipelines.judge import (
+    estimate,
+    join_status,
+    jump_events,
+    unjudged,
+    verdicts,
+    without_position,
+)
 from surefix.pipelines.observe import epochs_of, grid_times, padded, status_of, steady
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.present import nothing, pick, settings, track_of
@@ -65,6 +72,7 @@ class _Session:
     arrived: dict[tuple[str, str], list[Channel]] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     has_depth: bool = False
+    held: int = 0
 
 
 def clean_sources(sources: Iterable[Source], options: CleanOptions) -> Cleaned:
@@ -124,10 +132,13 @@ def _batches(session: _Session, chunks: list[Chunk], *, final: bool) -> Iterator
     if session.options.mode == "realtime" and rows is not None and len(rows.tau) > _PORTION:
         starts = range(0, len(rows.tau), _PORTION)
         portions = [take_rows(rows, slice(at, at + _PORTION)) for at in starts]
-    first = _batch(session, portions[0], chunks, final=final)
-    yield first
+    yield _batch(session, portions[0], chunks, final=final)
     for portion in portions[1:]:
         yield _batch(session, portion, [], final=False)
+    if final and session.held:
+        text = f"{session.held} fixes were held, the same position polled again; each counted once"
+        empty = nothing(tuple(session.sensors), session.options, session.setup)
+        yield replace(empty, sources=session.names, events=(Event("held", np.nan, text),))
 
 
 def _batch(session: _Session, rows: Rows | None, chunks: list[Chunk], *, final: bool) -> Cleaned:
@@ -211,12 +222,19 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
             judged, np.concatenate([lost, np.zeros(len(grid), np.bool_)])[order]
         )
     track = track_of(setup, found, np.concatenate([rows.time, grid])[order])
+    late = np.flatnonzero(known.reason == Reason.LATE)
+    for column in track[1:]:
+        if column is not None:
+            column[late] = np.nan  # the track had passed before they came
     fix = np.flatnonzero((order < len(tau)) & ~auxiliary)
     mine = take_rows(rows, order[fix])
+    judged = Verdicts._make(column[fix] for column in judged)
+    session.held += int((judged.reason == Reason.HELD).sum())
+    events += jump_events(judged)
     return replace(
         nothing(tuple(session.sensors), options, setup),
         track=pick(track, fix),
-        verdicts=Verdicts._make(column[fix] for column in judged),
+        verdicts=judged,
         raw_position=position[order[fix]] + setup.origin,
         raw_coordinates=mine.fixes.position,
         sensor=mine.fixes.sensor,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,9 +13,9 @@ import numpy as np
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import Progress, open_inputs
 from surefix.pipelines.options import CleanOptions, Mode
-from surefix.pipelines.summary import span, summary
+from surefix.pipelines.summary import said, span, summary
 from surefix.report.headline import counts as counts_of
-from surefix.types import Cleaned, FloatArray, Log, Verdict, Verdicts
+from surefix.types import Cleaned, Event, FloatArray, Log, Verdict, Verdicts
 
 __all__ = ["describe", "info_lines"]
 
@@ -24,6 +25,9 @@ _LARGE = 64 << 20  # bytes; larger inputs are looked through in real time, not a
 def describe(
     inputs: Sequence[str | Path],
     *,
+    depth: str | Path | None = None,
+    velocity: str | Path | None = None,
+    heading: str | Path | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     progress: Progress | None = None,
@@ -32,12 +36,18 @@ def describe(
 
     Parameters
     ----------
-    inputs, columns, require_checksum, progress
+    inputs, depth, velocity, heading, columns, require_checksum, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
     sources = open_inputs(
-        inputs, columns=columns, require_checksum=require_checksum, progress=progress
+        inputs,
+        depth=depth,
+        velocity=velocity,
+        heading=heading,
+        columns=columns,
+        require_checksum=require_checksum,
+        progress=progress,
     )
     for source in sources:
         source.logs = _counting(source.logs, counts.setdefault(source.name, {}))
@@ -53,7 +63,12 @@ def describe(
         "noise": found["noise"],
         "events": found["events"],
         "problems": found["problems"],
-        "command": _command(inputs, columns, require_checksum),
+        "command": _command(
+            inputs,
+            {"--depth": depth, "--velocity": velocity, "--heading": heading},
+            columns,
+            require_checksum,
+        ),
     }
 
 
@@ -116,11 +131,16 @@ def _rounded(value: float) -> float | None:
 
 
 def _command(
-    inputs: Sequence[str | Path], columns: Mapping[str, str] | None, require_checksum: bool
+    inputs: Sequence[str | Path],
+    others: Mapping[str, str | Path | None],
+    columns: Mapping[str, str] | None,
+    require_checksum: bool,
 ) -> str:
     """The `clean` command that fits these inputs."""
     stem = Path(inputs[0]).stem
     words = ["surefix", "clean", *(str(path) for path in inputs)]
+    for option, path in others.items():
+        words += [option, str(path)] if path is not None else []
     for role, column in (columns or {}).items():
         words += ["--column", f"{role}={column}"]
     if not require_checksum:
@@ -144,7 +164,7 @@ def info_lines(found: Mapping[str, Any]) -> list[str]:
         for n in found["noise"]
         if n["value"] is not None
     ]
-    out += [f"  note: {event['text']}" for event in found["events"][:20]]
+    out += [f"  note: {_event(event)}" for event in found["events"][:20]]
     if len(found["events"]) > 20:
         out.append(f"  note: and {len(found['events']) - 20} more, see --json")
     for problem in found["problems"]:
@@ -153,6 +173,11 @@ def info_lines(found: Mapping[str, Any]) -> list[str]:
             f"  input: {problem['total']} × {problem['kind']} ({problem['example']}){remedy}"
         )
     return [*out, "to clean it:", f"  {found['command']}"]
+
+
+def _event(event: Mapping[str, Any]) -> str:
+    time = math.nan if event["time"] is None else event["time"]
+    return said(Event(event["kind"], time, event["text"]))
 
 
 def _told(stream: Mapping[str, Any]) -> str:

@@ -20,7 +20,10 @@ from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Source
 from surefix.types import Channel, Fixes, FloatArray, Log
 
-__all__ = ["Progress", "open_frames", "open_inputs", "open_log"]
+__all__ = ["Data", "Progress", "open_inputs", "open_log"]
+
+Data = Any
+"""A file, or a table: a data frame, an Arrow table, a mapping of names to arrays."""
 
 Progress = Callable[[int], None]
 _HEAD = 1 << 16
@@ -28,94 +31,123 @@ _BODY = ("forward_mps", "starboard_mps", "down_mps")
 
 
 def open_inputs(
-    inputs: Sequence[str | Path],
+    inputs: Sequence[Data],
     *,
-    depth: str | Path | None = None,
-    velocity: str | Path | None = None,
-    heading: str | Path | None = None,
+    depth: Data | None = None,
+    velocity: Data | None = None,
+    heading: Data | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     progress: Progress | None = None,
 ) -> list[Source]:
-    """Open files as sources.
+    """Open files, or tables in memory, as sources.
 
     Parameters
     ----------
     inputs
-        Files with positions, CSV, Parquet or NMEA 0183.
+        Logs with positions: files (CSV, Parquet or NMEA 0183) or tables (data frames, Arrow
+        tables, mappings of names to arrays).
     depth, velocity, heading
-        Files of other sensors, with their own clocks and rates.
+        Other sensors, each a file or a table, with their own clocks and rates.
     columns
-        Roles and columns as in `surefix.io.columns`. ``depth.time`` is a role of the depth file
-        alone; a plain ``time`` also holds for the other files that have such a column.
+        Roles and columns as in `surefix.io.columns`. ``depth.time`` is a role of the depth log
+        alone; a plain ``time`` also holds for the other logs that have such a column.
     require_checksum
         False accepts NMEA sentences without a checksum.
     progress
-        Told the bytes that were read, over all inputs.
+        Told the bytes that were read, over all files.
+
+    Raises
+    ------
+    InputError, ParseError, OptionsError
+        As the readers; or a column is named for a log that is not given.
     """
     if not inputs:
         raise OptionsError("no input", "one file or more")
-    chosen = dict(columns or {})
-    told = _Told(progress)
-    sources = []
-    for path in inputs:
-        own = {role: column for role, column in chosen.items() if "." not in role}
-        logs = open_log(path, columns=own, require_checksum=require_checksum, progress=told.next())
-        sources.append(Source(logs, "fixes", Path(path).name))
-    extra: tuple[tuple[Role, str | Path | None], ...] = (("depth", depth), ("heading", heading))
-    for role, other in extra:
-        if other is not None:
-            logs = _supporting(other, role, chosen, require_checksum, told.next())
-            sources.append(Source(logs, role, Path(other).name))
-    if velocity is not None:
-        logs = _supporting(velocity, "velocity", chosen, require_checksum, told.next())
-        turning = None
-        if heading is not None:
-            turning = list(_supporting(heading, "heading", chosen, require_checksum, None))
-        sources.append(Source(_earth_frame(logs, turning), "velocity", Path(velocity).name))
-    return sources
-
-
-def open_frames(
-    fixes: Any,
-    *,
-    depth: Any = None,
-    velocity: Any = None,
-    heading: Any = None,
-    columns: Mapping[str, str] | None = None,
-) -> list[Source]:
-    """Open tables (data frames, Arrow tables, mappings of names to arrays) as sources.
-
-    Arguments as for `open_inputs`.
-    """
-    chosen = dict(columns or {})
-    own = {role: column for role, column in chosen.items() if "." not in role}
-    sources = [Source(iter([from_frame(fixes, mapping=own)]), "fixes", "table")]
-
-    def supporting(table: Any, role: Role) -> Log:
-        mine = _own(chosen, role)
-        shared = {"time": chosen["time"]} if "time" in chosen and "time" not in mine else {}
-        try:
-            return from_frame(table, mapping={**shared, **mine}, role=role, sensor=role)
-        except (ParseError, OptionsError):
-            return from_frame(table, mapping=mine, role=role, sensor=role)
-
+    opener = _Opener(dict(columns or {}), require_checksum, progress)
+    given = {"depth": depth, "velocity": velocity, "heading": heading}
+    opener.check({role for role, data in given.items() if data is not None})
+    sources = [Source(opener.open(data, "fixes"), "fixes", _name(data)) for data in inputs]
     if depth is not None:
-        sources.append(Source(iter([supporting(depth, "depth")]), "depth", "depth"))
-    turning = [supporting(heading, "heading")] if heading is not None else None
-    if turning is not None:
-        sources.append(Source(iter(turning), "heading", "heading"))
+        sources.append(Source(opener.open(depth, "depth"), "depth", _name(depth, "depth")))
+    if heading is not None and not any(_same(heading, data) for data in inputs):
+        sources.append(
+            Source(opener.open(heading, "heading"), "heading", _name(heading, "heading"))
+        )
     if velocity is not None:
-        logs = _earth_frame(iter([supporting(velocity, "velocity")]), turning)
-        sources.append(Source(logs, "velocity", "velocity"))
+        turning = list(opener.open(heading, "heading")) if heading is not None else None
+        logs = _earth_frame(opener.open(velocity, "velocity"), turning)
+        sources.append(Source(logs, "velocity", _name(velocity, "velocity")))
     return sources
 
 
-def _own(columns: Mapping[str, str], role: str) -> dict[str, str]:
-    """Columns that are meant for the file of one role: ``depth.time`` → ``time``."""
-    return {
-        key.partition(".")[2]: value for key, value in columns.items() if key.startswith(role + ".")
-    }
+def _name(data: Data, role: str = "table") -> str:
+    return Path(data).name if isinstance(data, str | Path) else role
+
+
+def _same(one: Data, two: Data) -> bool:
+    if isinstance(one, str | Path) and isinstance(two, str | Path):
+        return Path(one).resolve() == Path(two).resolve()
+    return one is two
+
+
+class _Opener:
+    """Opens logs with the columns that are meant for each, and adds up the bytes they report."""
+
+    def __init__(
+        self, columns: dict[str, str], require_checksum: bool, progress: Progress | None
+    ) -> None:
+        self._columns, self._require_checksum = columns, require_checksum
+        self._progress = progress
+        self._done: list[int] = []
+
+    def check(self, roles: set[str]) -> None:
+        """Refuse columns for logs that are not given."""
+        for key in self._columns:
+            role, dot, _ = key.partition(".")
+            if dot and role not in roles:
+                told = ", ".join(sorted(roles)) or "none"
+                raise OptionsError(f"a column for {key!r}", f"a log that is given: {told}")
+
+    def open(self, data: Data, role: Role) -> Iterator[Log]:
+        """Open one log; a time column named for all need not be there in a supporting one."""
+        own = self._own(role)
+        if role == "fixes" or "time" in own or "time" not in self._columns:
+            return self._open(data, role, own)
+        try:
+            return self._open(data, role, {"time": self._columns["time"], **own})
+        except (ParseError, OptionsError):
+            return self._open(data, role, own)
+
+    def _own(self, role: Role) -> dict[str, str]:
+        if role == "fixes":
+            return {key: column for key, column in self._columns.items() if "." not in key}
+        parts = {key.partition("."): column for key, column in self._columns.items()}
+        return {key: column for (prefix, _, key), column in parts.items() if prefix == role and key}
+
+    def _open(self, data: Data, role: Role, columns: Mapping[str, str]) -> Iterator[Log]:
+        if not isinstance(data, str | Path):
+            name = "fix" if role == "fixes" else role
+            return iter([from_frame(data, mapping=columns, role=role, sensor=name, source="table")])
+        return open_log(
+            data,
+            role=role,
+            columns=columns,
+            require_checksum=self._require_checksum,
+            progress=self._next_progress(),
+        )
+
+    def _next_progress(self) -> Progress | None:
+        if self._progress is None:
+            return None
+        at, report = len(self._done), self._progress
+        self._done.append(0)
+
+        def tell(done: int) -> None:
+            self._done[at] = done
+            report(sum(self._done))
+
+        return tell
 
 
 def open_log(
@@ -142,52 +174,6 @@ def open_log(
     if sniff(head):
         return read_nmea(place, require_checksum=require_checksum, progress=progress)
     return read_table(place, mapping=columns, role=role, sensor=place.stem, progress=progress)
-
-
-class _Told:
-    """Adds up the bytes that several readers report, each for its own file."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._done: list[int] = []
-
-    def next(self) -> Progress | None:
-        if self._progress is None:
-            return None
-        at, report = len(self._done), self._progress
-        self._done.append(0)
-
-        def tell(done: int) -> None:
-            self._done[at] = done
-            report(sum(self._done))
-
-        return tell
-
-
-def _supporting(
-    path: str | Path,
-    role: Role,
-    columns: Mapping[str, str],
-    require_checksum: bool,
-    progress: Progress | None,
-) -> Iterator[Log]:
-    """Open a file of another sensor; a shared time column need not be there."""
-    own = _own(columns, role)
-    shared = {"time": columns["time"]} if "time" in columns and "time" not in own else {}
-    try:
-        return open_log(
-            path,
-            role=role,
-            columns={**shared, **own},
-            require_checksum=require_checksum,
-            progress=progress,
-        )
-    except (ParseError, OptionsError):
-        if not shared:
-            raise
-    return open_log(
-        path, role=role, columns=own, require_checksum=require_checksum, progress=progress
-    )
 
 
 def _earth_frame(logs: Iterator[Log], turning: list[Log] | None) -> Iterator[Log]:

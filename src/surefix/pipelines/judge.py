@@ -10,13 +10,15 @@ from surefix.filters.modes import lagged, realtime
 from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
 from surefix.pipelines.options import CleanOptions
-from surefix.types import BoolArray, FloatArray, IntArray, Reason, Verdict, Verdicts
+from surefix.reasons import clock
+from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = [
     "Status",
     "blank_status",
     "estimate",
     "join_status",
+    "jump_events",
     "unjudged",
     "verdicts",
     "without_position",
@@ -144,6 +146,19 @@ def without_position(judged: Verdicts, lost: BoolArray) -> Verdicts:
         verdict=np.where(where, int(Verdict.MISSING), judged.verdict),
         reason=np.where(where, int(Reason.NO_POSITION), judged.reason),
     )
+
+
+def jump_events(judged: Verdicts) -> list[Event]:
+    """Jumps of the track that were accepted."""
+    return [
+        Event(
+            "jump",
+            time,
+            f"the track jumps at {clock(time)}: the fixes from there on agree with each other, "
+            "not with those before",
+        )
+        for time in judged.detail[judged.reason == Reason.JUMP].tolist()
+    ]
 
 
 def unjudged(status: Status) -> Verdicts:

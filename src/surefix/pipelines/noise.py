@@ -109,15 +109,18 @@ def _under(
 
 def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:
     """The user's figures per sensor; NaN where there is none."""
-    auxiliary = set(np.unique(rows.fixes.sensor[rows.auxiliary]).tolist())
-    general = options.sigma_height if vertical else options.sigma_position
-    position = np.array(
-        [
-            options.sensor_sigma.get(name, (None if i in auxiliary else general) or np.nan)
-            for i, name in enumerate(sensors)
-        ]
-    )
+    general = (options.sigma_height if vertical else options.sigma_position) or np.nan
+    position = np.full(len(sensors), np.nan)
     velocity = np.full(len(sensors), options.sigma_velocity or np.nan)
+    for i, name in enumerate(sensors):
+        mine = rows.fixes.sensor == i
+        if not rows.auxiliary[mine].any():
+            position[i] = general
+        own = options.sensor_sigma.get(name)
+        if own is not None and np.isfinite(rows.fixes.position[mine]).any():
+            position[i] = own
+        elif own is not None:
+            velocity[i] = own
     return NoiseFigures(position, velocity, options.process or np.nan)
 
 

@@ -40,6 +40,8 @@ def status_of(rows: Rows, repeats: Repeats, *, held: bool) -> Status:
         status.mark(repeats.held, Verdict.DUPLICATE, Reason.HELD)
     copies = status.verdict == Verdict.DUPLICATE
     status.detail[copies] = repeats.first[copies]
+    before = np.maximum.accumulate(np.where(np.isfinite(rows.time), rows.time, -np.inf))
+    status.detail[rows.late] = before[rows.late]
     return status
 
 

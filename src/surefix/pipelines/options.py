@@ -39,11 +39,13 @@ class CleanOptions:
         Seconds of future in the lagged mode; default 20 intervals between fixes.
     recovery_s
         Seconds of unbroken rejection after which a track believes its sensor again; default 30
-        intervals between fixes. Runs of errors shorter than this are survived.
+        intervals between fixes. No loss locks out for longer. Runs of errors may be followed
+        sooner where only fixes support the track, for its own uncertainty grows meanwhile.
     sigma_position, sigma_height, sigma_velocity
         Noise of the fixes: horizontal m, vertical m, velocity m/s.
     sensor_sigma
-        The same for single sensors, by name; wins over the three above.
+        Noise of single sensors, by name: of the positions of a sensor that has some, else of its
+        depths or velocities. Wins over the three above.
     sensor_delay_s
         How much too late a sensor's times are, s, by name; subtracted.
     process
@@ -90,6 +92,10 @@ class CleanOptions:
         for name in ("k0", "k1"):
             if getattr(self, name) is not None:
                 _number(name, getattr(self, name))
+        if self.lag_s is not None and self.mode != "lagged":
+            raise OptionsError(f"a lag in mode {self.mode}", "mode lagged")
+        if self.method in ("kalman", "gate") and (self.k0, self.k1) != (None, None):
+            raise OptionsError(f"k0 or k1 with method {self.method}", "a method that has them")
         _number("false_alarm", self.false_alarm)
         if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surefix.errors import OptionsError
 from surefix.filters.noise import speed_scale
 from surefix.filters.records import Motion, Recovery
 from surefix.filters.track import by_block
@@ -90,7 +91,15 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
         Names of the sensors.
     options
         Figures given there win over estimates.
+
+    Raises
+    ------
+    OptionsError
+        A sensor is named that the log does not have.
     """
+    unknown = sorted({*options.sensor_sigma, *options.sensor_delay_s} - set(sensors))
+    if unknown:
+        raise OptionsError(f"options for sensor {unknown[0]!r}", "one of " + ", ".join(sensors))
     frame, origin = _frame(rows, usable)
     position, velocity = localise(rows, frame, origin)
     position[~usable], velocity[~usable] = np.nan, np.nan

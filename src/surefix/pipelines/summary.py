@@ -8,10 +8,11 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
+from surefix.reasons import clock
 from surefix.report.headline import counts, headline
-from surefix.types import Cleaned, Verdict
+from surefix.types import Cleaned, Event, Verdict
 
-__all__ = ["lines", "span", "summary"]
+__all__ = ["lines", "said", "span", "summary"]
 
 _CALENDAR_FROM = 1e8  # s; smaller times carry no date
 _TOP_EVENTS = 8
@@ -91,7 +92,7 @@ def lines(
         )
     for channel in cleaned.channels:
         out.append(f"  {channel.sensor} {channel.name}: {_verdicts(counts(channel.verdicts))}")
-    out += [f"  note: {event.text}" for event in cleaned.events[:_TOP_EVENTS]]
+    out += [f"  note: {said(event)}" for event in cleaned.events[:_TOP_EVENTS]]
     if len(cleaned.events) > _TOP_EVENTS:
         out.append(
             f"  note: and {len(cleaned.events) - _TOP_EVENTS} more, in the report and --json"
@@ -115,6 +116,15 @@ def _known(value: float) -> float | None:
 
 def _figure(value: float, unit: str) -> str:
     return f"{value:.3g} {unit}" if math.isfinite(value) else "unknown"
+
+
+def said(event: Event) -> str:
+    """An event with the time of day it concerns, if it has one.
+
+    >>> said(Event("gap", 1699643598.0, "no fix for 36.4 s"))
+    '19:13:18.0 no fix for 36.4 s'
+    """
+    return f"{clock(event.time)} {event.text}" if math.isfinite(event.time) else event.text
 
 
 def span(start: float, end: float) -> str:
