@@ -74,7 +74,10 @@ def _names(name: str, info: Any) -> str:
 def _value(kind: Any, info: Any) -> str:
     if info.metavar:
         return f"`{info.metavar}`"
-    inner = {each for each in _leaves(kind) if each is not type(None)}
+    leaves = [each for each in _leaves(kind) if each is not type(None)]
+    if all(isinstance(each, str) for each in leaves):  # one word of a list
+        return " ".join(f"`{each}`" for each in leaves)
+    inner = set(leaves)
     words = {bool: "", str: "`TEXT`", float: "`NUMBER`", int: "`NUMBER`", Path: "`PATH`"}
     return words[inner.pop()]
 

@@ -145,7 +145,7 @@ def test_block_size_of_the_reader(tmp_path, monkeypatch, mode):
     frame = faulty()
     path = write(tmp_path / "log.csv", frame)
     options = CleanOptions(mode=mode)
-    results = [clean_sources(inputs.open_frames(pd.read_csv(path)), options)]
+    results = [clean_sources(inputs.open_inputs([pd.read_csv(path)]), options)]
     read = inputs.read_table
     for block in (1 << 22, 20_000):
         monkeypatch.setattr(inputs, "read_table", partial(read, chunk=block))

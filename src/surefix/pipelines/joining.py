@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from surefix.types import Cleaned, CleanedChannel, Problem, Track, Verdicts
+from surefix.types import Cleaned, CleanedChannel, Event, Problem, Track, Verdicts
 
 __all__ = ["join", "thinned"]
 
@@ -33,9 +34,14 @@ def join(parts: list[Cleaned]) -> Cleaned:
         resampled=_join_tracks(resampled) if resampled else None,
         channels=tuple(_join_channel(pieces) for pieces in series.values()),
         noise=parts[-1].noise,
-        events=tuple(event for part in parts for event in part.events),
+        events=_in_time(event for part in parts for event in part.events),
         problems=_join_problems(problem for part in parts for problem in part.problems),
     )
+
+
+def _in_time(events: Iterable[Event]) -> tuple[Event, ...]:
+    """Events in the order of time; those of the whole log come last."""
+    return tuple(sorted(events, key=lambda e: e.time if math.isfinite(e.time) else math.inf))
 
 
 def thinned(cleaned: Cleaned, every: int) -> Cleaned:

@@ -10,7 +10,6 @@ from surefix.filters.modes import lagged, realtime
 from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
 from surefix.pipelines.options import CleanOptions
-from surefix.reasons import clock
 from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = [
@@ -154,8 +153,7 @@ def jump_events(judged: Verdicts) -> list[Event]:
         Event(
             "jump",
             time,
-            f"the track jumps at {clock(time)}: the fixes from there on agree with each other, "
-            "not with those before",
+            "the track jumps: the fixes from here on agree with each other, not with those before",
         )
         for time in judged.detail[judged.reason == Reason.JUMP].tolist()
     ]
