@@ -100,6 +100,25 @@ def test_one_wild_fix_of_500_m_moves_nothing(method):
 
 
 @pytest.mark.parametrize("method", REDESCENDING)
+def test_two_wild_fixes_a_minute_apart_are_not_yet_a_jump(method):
+    """However short the recovery is beside the interval, three must agree."""
+    truth, _, epochs, motion = shifted(0, 800.0, velocity=0.02, step=60.0, until=AT + 2)
+    found = run(method, epochs, motion._replace(density=np.full(2, 1e-5)), Recovery(10.0, 5.0))
+    assert not found.jump[20:].any()
+    assert (found.weight[AT : AT + 2, 0] < 0.1).all()
+    assert errors(found, truth)[20:].max() < 10.0
+
+
+@pytest.mark.parametrize("method", REDESCENDING)
+def test_a_dozen_good_fixes_settle_a_track(method):
+    truth, epochs, motion = straight(3, 100, velocity=0.1)
+    epochs.z[14:34, :2] += 500.0
+    found = run(method, epochs, motion)
+    assert not found.jump.any()
+    assert errors(found, truth)[10:].max() < 4.0
+
+
+@pytest.mark.parametrize("method", REDESCENDING)
 def test_excursions_again_and_again_do_not_add_up(method):
     """A good fix in between ends a run of rejections."""
     truth, epochs, motion = straight(0, 400, velocity=0.1)
