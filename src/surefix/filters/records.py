@@ -88,8 +88,8 @@ class TrackState(NamedTuple):
         (groups,) observations used since the group's state was last unknown.
     streak, since
         (groups,) rejections on end, and the time of the first of them.
-    recent
-        (5, m) the last rejected observations of each component.
+    recent, recent_time
+        (5, m) the last rejected observations of each component, and (5, groups) their times.
     """
 
     time: float
@@ -99,6 +99,7 @@ class TrackState(NamedTuple):
     streak: IntArray
     since: FloatArray
     recent: FloatArray
+    recent_time: FloatArray
 
 
 class Filtered(NamedTuple):

@@ -63,6 +63,7 @@ def start(motion: Motion, recovery: Recovery) -> TrackState:
         np.zeros(groups, np.int64),
         np.full(groups, np.nan),
         np.full((RECENT, 2 * d), np.nan),
+        np.full((RECENT, groups), np.nan),
     )
 
 
@@ -121,6 +122,7 @@ def filter_track(
         state.streak.copy(),
         state.since.copy(),
         state.recent.copy(),
+        state.recent_time.copy(),
     )
     done = run(motion, loss, recovery, epochs, after, out, until_recovery)
     last = float(epochs.time[done - 1]) if done else state.time

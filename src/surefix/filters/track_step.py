@@ -196,9 +196,15 @@ def _recover(
     A: FloatArray,
     scratch: FloatArray,
 ) -> None:
-    """Restart the state of group g at the median of its last rejected observations."""
+    """Restart the state of group g at the median of its last rejected observations.
+
+    Its rate is vague: twice the change among them, at least the usual figure.
+    """
     d, n = motion.axes, motion.order * motion.axes
     count = min(state.streak[g], RECENT)
+    newest = (state.streak[g] - 1) % RECENT
+    oldest = (state.streak[g] - count) % RECENT
+    span = state.recent_time[newest, g] - state.recent_time[oldest, g]
     _load(A, state.factor, n)
     for c in range(2 * d):
         if motion.group[c] != g:
@@ -209,11 +215,15 @@ def _recover(
         for i in range(count):
             scratch[i] = abs(state.recent[i, c] - middle)
         spread = 1.4826 * _median(scratch, count)
+        rate = recovery.sigma_velocity
+        if span > 0.0:
+            change = abs(state.recent[newest, c] - state.recent[oldest, c]) / span
+            rate = max(rate, 2.0 * change)
         state.mean[c] = middle
         for s in range(c, n, d):
             for j in range(2 * n):
                 A[s, j] = 0.0
-            A[s, n + s] = recovery.sigma_velocity
+            A[s, n + s] = rate
             if s > c:
                 state.mean[s] = 0.0
         A[c, n + c] = 3.0 * (spread + math.sqrt(variance[c]))
@@ -242,6 +252,7 @@ def _remember(motion: Motion, state: TrackState, g: int, time: float, nu: FloatA
     if state.streak[g] == 0:
         state.since[g] = time
     slot = state.streak[g] % RECENT
+    state.recent_time[slot, g] = time
     for c in range(2 * motion.axes):
         if motion.group[c] == g:
             lost = math.isnan(nu[c])
