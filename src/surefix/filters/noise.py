@@ -32,6 +32,7 @@ _WINDOW = 100.0  # width of the window gross errors fall in, in initial standard
 _Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
 _SAMPLE = 2000  # epochs the likelihood is evaluated on
 _FEW = 30  # rows that a sensor needs for a figure of its own, where there are others
+_SHRINKS = (0.0, -1.4, -2.8)  # logarithms by which the initial figures are tried smaller
 _BLOCKS = 6  # stretches of the log they come from
 
 
@@ -174,7 +175,12 @@ def estimate_noise(
         return figures(np.zeros(0))._replace(cost=cost(np.zeros(0)))
     best = np.zeros(size)
     if free_process:
-        trials = np.array([[*best[:-1], level] for level in np.arange(-9.0, 3.1, 1.5)])
+        measured = size - 1
+        trials = [
+            np.array([*np.full(measured, shrink), level])
+            for shrink in _SHRINKS[: 1 if measured == 0 else None]
+            for level in np.arange(-9.0, 3.1, 1.5 if shrink == 0.0 else 3.0)
+        ]
         best = trials[int(np.argmin([cost(trial) for trial in trials]))]
     simplex = np.vstack([best, best - 0.7 * np.eye(size)])
     found = minimize(

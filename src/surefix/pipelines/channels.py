@@ -31,6 +31,7 @@ CHANNEL_HEAD = 2000
 
 _RECOVERY_VALUES = 30
 _LAG_VALUES = 20
+_FARTHEST = 1e9  # what lies beyond is as wild as what lies there, and its square is finite
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
 _UNKNOWN = 1e5  # a standard deviation from here on means that nothing is known
@@ -100,7 +101,7 @@ def clean_channel(
     status.detail[status.verdict == Verdict.DUPLICATE] = found.first[
         status.verdict == Verdict.DUPLICATE
     ]
-    z = np.where(status.verdict < 0, raw, np.nan)
+    z = np.clip(np.where(status.verdict < 0, raw, np.nan), -_FARTHEST, _FARTHEST)
     if state.motion is None:
         state = _settle(state, new, tau[head], z[head], options)
     assert state.motion is not None

@@ -67,7 +67,7 @@ class _Session:
     repeats: RepeatState | None = None
     filter: TrackState | None = None
     last_tau: float = -np.inf
-    next_grid: float = np.nan
+    next_grid: int | None = None
     channels: dict[tuple[str, str], ChannelState] = field(default_factory=dict)
     arrived: dict[tuple[str, str], list[Channel]] = field(default_factory=dict)
     names: tuple[str, ...] = ()
@@ -292,12 +292,12 @@ def _idle_events(session: _Session) -> list[Event]:
 
 
 def _grid(session: _Session, setup: Setup, tau: FloatArray) -> FloatArray:
-    """Regular times that are due in this batch."""
+    """Regular times that are due in this batch: whole multiples of the step."""
     every = session.options.every_s
     if every is None:
         return np.empty(0)
-    if np.isnan(session.next_grid):
-        session.next_grid = float(np.ceil(tau[0] / every) * every)
+    if session.next_grid is None:
+        session.next_grid = int(np.ceil(tau[0] / every))
     first = session.next_grid
-    session.next_grid += every * max(0.0, np.floor((tau[-1] - first) / every) + 1.0)
+    session.next_grid = max(first, int(np.floor(tau[-1] / every)) + 1)
     return grid_times(tau, every, first, session.last_tau, setup.interval)

@@ -46,30 +46,30 @@ def status_of(rows: Rows, repeats: Repeats, *, held: bool) -> Status:
 
 
 def grid_times(
-    tau: FloatArray, every: float, first: float, last: float, interval: float
+    tau: FloatArray, every: float, first: int, last: float, interval: float
 ) -> FloatArray:
-    """Regular times from ``first`` to the end of ``tau``, leaving out long gaps.
+    """Whole multiples of a step up to the end of ``tau``, leaving out long gaps.
 
     Parameters
     ----------
     tau
         (n,) filter times of the batch, n > 0.
     every, interval
-        Step of the regular times, and usual interval between fixes, s.
+        The step, and the usual interval between fixes, s.
     first
-        The next regular time that is due.
+        The first multiple that is due.
     last
         Filter time of the batch before, −∞ at the beginning.
     """
     edges = np.concatenate([[last], tau]) if np.isfinite(last) else tau
     longest = max(_LONGEST, _GAP_INTERVALS * interval)
     breaks = np.flatnonzero(np.diff(edges) > longest)
-    starts, ends = [first, *edges[breaks + 1]], [*edges[breaks], edges[-1]]
-    pieces = []
-    for a, b in zip(starts, ends, strict=True):
-        low, high = np.ceil((max(a, first) - first) / every), np.floor((b - first) / every)
-        pieces.append(first + every * np.arange(low, high + 1))
-    return np.concatenate(pieces)
+    starts, ends = [-np.inf, *edges[breaks + 1]], [*edges[breaks], edges[-1]]
+    multiples = [
+        np.arange(max(np.ceil(a / every), first), np.floor(b / every) + 1.0)
+        for a, b in zip(starts, ends, strict=True)
+    ]
+    return every * np.concatenate(multiples)
 
 
 def epochs_of(

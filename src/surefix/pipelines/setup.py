@@ -19,8 +19,11 @@ from surefix.types import BoolArray, Event, FloatArray, Noise
 
 __all__ = ["Setup", "localise", "settle"]
 
+_FARTHEST = 1e9  # m: what lies beyond is as wild as what lies there, and its square is finite
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
+_FEW_HEIGHTS = 3  # heights that show an offset
+_ANOTHER_DEPTH = 200.0  # m: a depth that differs more is not the vehicle's
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
 
 
@@ -75,7 +78,7 @@ def localise(
         position[:, 0], position[:, 1] = x, y
         turn = np.nan_to_num(convergence)
         velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], turn)
-    return position, velocity
+    return np.clip(position, -_FARTHEST, _FARTHEST), np.clip(velocity, -_FARTHEST, _FARTHEST)
 
 
 def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOptions) -> Setup:
@@ -149,27 +152,41 @@ def _frame(rows: Rows, usable: BoolArray) -> tuple[LocalFrame | None, FloatArray
 def _height_offsets(
     rows: Rows, position: FloatArray, sensors: list[str]
 ) -> tuple[FloatArray, tuple[Event, ...]]:
-    """Median difference of each sensor's height from the depth sensor's, where there is one."""
+    """Median difference of each sensor's height from the reference's.
+
+    The reference is the depth sensor, where there is one, else the sensor with most heights.
+
+    Raises
+    ------
+    OptionsError
+        The depth sensor measures something else than the depth of the vehicle.
+    """
     offset = np.zeros(len(sensors))
     events = []
-    depth = rows.auxiliary & np.isfinite(position[:, 2])
-    if not depth.any():
-        return offset, ()
-    for sensor in np.unique(rows.fixes.sensor[~rows.auxiliary]).tolist():
-        mine = ~rows.auxiliary & (rows.fixes.sensor == sensor) & np.isfinite(position[:, 2])
-        if mine.sum() < 3:
+    heights = np.isfinite(position[:, 2]) & np.isfinite(rows.tau)
+    depth = rows.auxiliary & heights
+    counts = np.bincount(rows.fixes.sensor[heights & ~rows.auxiliary], minlength=len(sensors))
+    main = int(np.argmax(counts))
+    reference = depth if depth.any() else heights & (rows.fixes.sensor == main)
+    named = "the depth sensor" if depth.any() else sensors[main]
+    for sensor in np.flatnonzero(counts >= _FEW_HEIGHTS).tolist():
+        mine = heights & ~rows.auxiliary & (rows.fixes.sensor == sensor)
+        if not depth.any() and sensor == main:
             continue
-        reference = np.interp(rows.tau[mine], rows.tau[depth], position[depth, 2])
-        differences = position[mine, 2] - reference
+        expected = np.interp(rows.tau[mine], rows.tau[reference], position[reference, 2])
+        differences = position[mine, 2] - expected
         middle = float(np.median(differences))
         spread = 1.4826 * float(np.median(np.abs(differences - middle)))
+        if depth.any() and abs(middle) > _ANOTHER_DEPTH:
+            raise OptionsError(
+                f"the depth log lies {middle:.0f} m from the heights of {sensors[sensor]}",
+                "the depth of the vehicle itself",
+                "give a log of water depth as an input of its own",
+            )
         if abs(middle) > _DISAGREE * spread / np.sqrt(mine.sum()):
             offset[sensor] = middle
-            text = (
-                f"the height of {sensors[sensor]} lies {middle:+.2f} m from the depth sensor's; "
-                "subtracted"
-            )
-            events.append(Event("height-offset", np.nan, text))
+            text = f"the height of {sensors[sensor]} lies {middle:+.2f} m from that of {named}"
+            events.append(Event("height-offset", np.nan, text + "; subtracted"))
     return offset, tuple(events)
 
 
