@@ -3,14 +3,11 @@
 import re
 
 import numpy as np
-import pandas as pd
-import pytest
 
 from acceptance.product import (
     FIXED,
     START,
     clean,
-    geographic,
     read,
     sentence,
     surefix,
@@ -21,23 +18,6 @@ from acceptance.product import (
 
 MODES = ("realtime", "lagged", "offline")
 METHODS = ("kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t")
-
-
-@pytest.fixture
-def log(tmp_path):
-    """A metric log with wild fixes, a missing one, a copy, and rows out of order."""
-    columns = pd.DataFrame(survey(300))
-    columns.loc[[40, 111, 203], "x"] += 60.0
-    columns.loc[77, ["x", "y", "z"]] = np.nan
-    columns = pd.concat([columns[:151], columns[150:]], ignore_index=True)
-    columns.iloc[[250, 252]] = columns.iloc[[252, 250]].to_numpy()
-    columns.to_csv(tmp_path / "dive.csv", index=False)
-    return tmp_path / "dive.csv"
-
-
-@pytest.fixture
-def globe(tmp_path):
-    return write(tmp_path / "globe.csv", geographic(survey(120), 60.0, 5.0))
 
 
 def test_report_and_series_beside_the_output(log, tmp_path):
