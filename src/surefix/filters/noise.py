@@ -129,6 +129,7 @@ def estimate_noise(
     order: int = 2,
     period: float = 0.0,
     quantum: float = 0.0,
+    velocity_quantum: float = 0.0,
 ) -> NoiseFigures:
     """Estimate the noise figures that ``given`` leaves NaN.
 
@@ -140,15 +141,16 @@ def estimate_noise(
         Figures that are known; their length tells how many sensors there are.
     order, period
         Of the motion model.
-    quantum
-        Resolution of the positions: no noise estimate falls below ``quantum/√12``.
+    quantum, velocity_quantum
+        Resolution of positions and velocities: no estimate falls below ``quantum/√12``.
     """
     sample = _thin(observations)
     axes = sample.z.shape[1] // 2
     start_position = _initial(sample, given.position, slice(0, axes), period)
     start_velocity = _initial(sample, given.velocity, slice(axes, 2 * axes), 0.0)
     floor = max(quantum / np.sqrt(12.0), 1e-9)
-    position, velocity = np.fmax(start_position, floor), np.fmax(start_velocity, 1e-9)
+    floor_velocity = max(velocity_quantum / np.sqrt(12.0), 1e-9)
+    position, velocity = np.fmax(start_position, floor), np.fmax(start_velocity, floor_velocity)
     free_position = np.isnan(given.position) & np.isfinite(start_position)
     free_velocity = np.isnan(given.velocity) & np.isfinite(start_velocity)
     free_process = np.isnan(given.process)
@@ -161,7 +163,9 @@ def estimate_noise(
         p, v, i = position.copy(), velocity.copy(), int(free_position.sum())
         j = i + int(free_velocity.sum())
         p[free_position] = np.maximum(scale.position[free_position] * _bounded(theta[:i]), floor)
-        v[free_velocity] = scale.velocity[free_velocity] * _bounded(theta[i:j])
+        v[free_velocity] = np.maximum(
+            scale.velocity[free_velocity] * _bounded(theta[i:j]), floor_velocity
+        )
         process = reference * np.exp(theta[j]) if free_process else given.process
         return NoiseFigures(p, v, float(process))
 

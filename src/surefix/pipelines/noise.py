@@ -15,6 +15,7 @@ from surefix.types import FloatArray, Noise
 __all__ = ["Figures", "settle_noise"]
 
 _METRES_PER_DEGREE = 111_195.0
+_LOOKED_AT = 50_000  # rows whose digits are looked at
 _PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
 
@@ -97,7 +98,11 @@ def _under(
         )
         given = _given(options, sensors, rows, vertical)
         found = estimate_noise(
-            observations, given, order=MODELS[model], quantum=_quantum(rows, block)
+            observations,
+            given,
+            order=MODELS[model],
+            quantum=_quantum(rows, block),
+            velocity_quantum=_velocity_quantum(velocity, block),
         )
         sigma_position[:, block] = found.position[:, None]
         sigma_velocity[:, block] = found.velocity[:, None]
@@ -127,12 +132,26 @@ def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool
 def _quantum(rows: Rows, block: list[int]) -> float:
     """Resolution of the recorded positions along the axes of a block, m; the coarsest counts."""
     recorded = rows.fixes.position[~rows.auxiliary]
-    steps = [grain(recorded[:50_000, axis]) for axis in block]
+    steps = [grain(recorded[:_LOOKED_AT, axis]) for axis in block]
     if rows.fixes.geographic and block[0] != 2:
         latitude = np.nanmedian(recorded[:, 0]) if np.isfinite(recorded[:, 0]).any() else 0.0
         per_degree = (_METRES_PER_DEGREE, _METRES_PER_DEGREE * np.cos(np.radians(latitude)))
         steps = [step * scale for step, scale in zip(steps, per_degree, strict=False)]
     return float(max(steps))
+
+
+def _velocity_quantum(velocity: FloatArray, block: list[int]) -> float:
+    """Resolution of the velocities along a block, m/s; horizontal ones may be speed and course."""
+    if len(block) < 2:
+        return grain(velocity[:_LOOKED_AT, block[0]])
+    east, north = velocity[:_LOOKED_AT, 0], velocity[:_LOOKED_AT, 1]
+    speed, course = np.hypot(east, north), np.arctan2(east, north)
+    moving = speed[speed > 0.0]
+    usual = float(np.median(moving)) if len(moving) else 0.0
+    return max(
+        grain(np.round(speed, 6).astype(np.float64)),
+        usual * grain(np.round(course[speed > 0.0], 6).astype(np.float64)),
+    )
 
 
 def _named(
