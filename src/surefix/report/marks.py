@@ -64,7 +64,7 @@ class Clock(NamedTuple):
             return np.where(np.isfinite(time), time, np.nan)
         known = np.isfinite(time) & (np.abs(time) < 1e11)
         ticks = np.round(np.where(known, time, 0.0) * 1e3).astype("datetime64[ms]")
-        return np.where(known, ticks, np.datetime64("NaT"))
+        return np.where(known, ticks, np.datetime64("NaT", "ms"))
 
     @property
     def range(self) -> list[str | float] | None:
