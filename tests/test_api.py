@@ -1,6 +1,7 @@
 """The library gives what the command line gives, from files and from tables; neither changes."""
 
 import hashlib
+from importlib.metadata import version
 
 import numpy as np
 import pandas as pd
@@ -184,3 +185,10 @@ def test_columns_say_what_a_table_means():
     found, wanted = sf.clean(named, columns=columns), sf.clean(log)
     np.testing.assert_allclose(found.track.position, wanted.track.position, atol=1e-9)
     assert surefix("--version").code == 0
+
+
+def test_the_result_names_the_versions_it_was_made_with():
+    settings = surefix.clean({"time": [0, 1, 2], "x": [0.0, 1.0, 2.0]}).settings
+    assert settings["surefix"] == version("surefix")
+    assert settings["numpy"] == np.__version__
+    assert {"python", "numba", "scipy"} <= set(settings)

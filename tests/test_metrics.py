@@ -4,7 +4,6 @@ import pytest
 from surefix.metrics import (
     mean_bounds,
     normalised_squares,
-    oracle_ratio,
     rejection_rates,
     rmse,
 )
@@ -50,9 +49,3 @@ def test_rejection_rates():
     assert rejection_rates(rejected, gross) == (0.5, 0.25)
     assert np.isnan(rejection_rates(rejected, np.zeros(6, dtype=bool)).detected)
     assert np.isnan(rejection_rates(rejected, np.ones(6, dtype=bool)).false_alarms)
-
-
-def test_oracle_ratio_is_one_for_the_oracle():
-    error, _ = sample(100)
-    assert oracle_ratio(error, error) == 1.0
-    assert oracle_ratio(2.0 * error, error) == pytest.approx(2.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from surefix.types import BoolArray, FloatArray
 
-__all__ = ["Rates", "mean_bounds", "normalised_squares", "oracle_ratio", "rejection_rates", "rmse"]
+__all__ = ["Rates", "mean_bounds", "normalised_squares", "rejection_rates", "rmse"]
 
 
 class Rates(NamedTuple):
@@ -117,27 +117,6 @@ def rejection_rates(rejected: BoolArray, gross: BoolArray) -> Rates:
     Rates(detected=1.0, false_alarms=0.3333333333333333)
     """
     return Rates(_share(rejected[gross]), _share(rejected[~gross]))
-
-
-def oracle_ratio(error: FloatArray, oracle_error: FloatArray) -> float:
-    """Total RMSE over that of an oracle: the same filter told which fixes to leave out.
-
-    Parameters
-    ----------
-    error, oracle_error
-        (n, d) of the two tracks, in one unit.
-
-    Returns
-    -------
-    ratio
-        1 is perfect.
-
-    Examples
-    --------
-    >>> oracle_ratio(np.array([[0.0, 1.5]]), np.array([[0.6, 0.8]]))
-    1.5
-    """
-    return float(np.linalg.norm(rmse(error)) / np.linalg.norm(rmse(oracle_error)))
 
 
 def _share(flags: BoolArray) -> float:

@@ -7,9 +7,10 @@ from datetime import UTC, datetime
 
 from surefix.types import Reason, Verdict, Verdicts
 
-__all__ = ["clock", "texts"]
+__all__ = ["CALENDAR_FROM", "clock", "texts"]
 
-_CALENDAR_FROM = 1e8  # s; smaller times count from the start of a log and carry no date
+CALENDAR_FROM = 1e8
+"""s: smaller times count from the start of a log and carry no date."""
 
 _FIXED = {
     Reason.AGREES: "agrees",
@@ -31,7 +32,7 @@ def clock(time: float) -> str:
     """
     if not math.isfinite(time):
         return "an unknown time"
-    if abs(time) < _CALENDAR_FROM:
+    if abs(time) < CALENDAR_FROM:
         return f"{time:.1f} s"
     tenths = round(time * 10.0)
     return f"{datetime.fromtimestamp(tenths // 10, UTC):%H:%M:%S}.{tenths % 10}"

@@ -15,12 +15,10 @@ from typing import BinaryIO
 from gpxpy.gpx import GPX, GPXTrack, GPXTrackPoint, GPXTrackSegment, GPXWaypoint
 
 from surefix.io.records import Batch, Form
-from surefix.reasons import texts
+from surefix.reasons import CALENDAR_FROM, texts
 from surefix.types import Verdict, Verdicts
 
 __all__ = ["gpx_sink"]
-
-_CALENDAR_FROM = 1e8  # s; smaller times count from the start of a log and carry no date
 
 
 @contextlib.contextmanager
@@ -76,6 +74,6 @@ def _finite(value: float) -> float | None:
 
 
 def _date(time: float) -> datetime | None:
-    if not math.isfinite(time) or abs(time) < _CALENDAR_FROM:
+    if not math.isfinite(time) or abs(time) < CALENDAR_FROM:
         return None
     return datetime.fromtimestamp(time, UTC)

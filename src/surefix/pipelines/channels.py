@@ -15,6 +15,8 @@ from surefix.geo.angle import wrap
 from surefix.models.motion import MODELS
 from surefix.pipelines.judge import blank_status, estimate, verdicts
 from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.present import UNKNOWN
+from surefix.pipelines.setup import FARTHEST
 from surefix.types import (
     Channel,
     CleanedChannel,
@@ -31,10 +33,8 @@ CHANNEL_HEAD = 2000
 
 _RECOVERY_VALUES = 30
 _LAG_VALUES = 20
-_FARTHEST = 1e9  # what lies beyond is as wild as what lies there, and its square is finite
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
-_UNKNOWN = 1e5  # a standard deviation from here on means that nothing is known
 
 
 class ChannelState(NamedTuple):
@@ -101,7 +101,7 @@ def clean_channel(
     status.detail[status.verdict == Verdict.DUPLICATE] = found.first[
         status.verdict == Verdict.DUPLICATE
     ]
-    z = np.clip(np.where(status.verdict < 0, raw, np.nan), -_FARTHEST, _FARTHEST)
+    z = np.clip(np.where(status.verdict < 0, raw, np.nan), -FARTHEST, FARTHEST)
     if state.motion is None:
         state = _settle(state, new, tau[head], z[head], options)
     assert state.motion is not None
@@ -125,7 +125,7 @@ def clean_channel(
     )
     judged = verdicts(estimated, epochs, state.motion, status)
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
-    known = (estimated.sigma[:, 0] < _UNKNOWN) & ~lost
+    known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
     cleaned = CleanedChannel(
         name=new.name,

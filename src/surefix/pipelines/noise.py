@@ -9,12 +9,11 @@ import numpy as np
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.rows import Rows
+from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
 from surefix.types import FloatArray, Noise
 
 __all__ = ["Figures", "settle_noise"]
 
-_METRES_PER_DEGREE = 111_195.0
 _LOOKED_AT = 50_000  # rows whose digits are looked at
 _PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
@@ -135,7 +134,7 @@ def _quantum(rows: Rows, block: list[int]) -> float:
     steps = [grain(recorded[:_LOOKED_AT, axis]) for axis in block]
     if rows.fixes.geographic and block[0] != 2:
         latitude = np.nanmedian(recorded[:, 0]) if np.isfinite(recorded[:, 0]).any() else 0.0
-        per_degree = (_METRES_PER_DEGREE, _METRES_PER_DEGREE * np.cos(np.radians(latitude)))
+        per_degree = (METRES_PER_DEGREE, METRES_PER_DEGREE * np.cos(np.radians(latitude)))
         steps = [step * scale for step, scale in zip(steps, per_degree, strict=False)]
     return float(max(steps))
 

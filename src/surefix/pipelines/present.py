@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from dataclasses import fields
+from importlib.metadata import version
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from surefix.types import Cleaned, FloatArray, IntArray, Track, Verdicts
 
 __all__ = ["UNKNOWN", "nothing", "pick", "settings", "track_of"]
 
+_VERSIONS = ("surefix", "numpy", "numba", "scipy", "pyproj", "pyarrow")
 UNKNOWN = 1e5
 """m: a standard deviation from here on means that nothing is known."""
 
@@ -94,4 +96,4 @@ def settings(options: CleanOptions, setup: Setup | None) -> dict[str, str]:
         if value is not None and value != {}
     }
     out["python"] = platform.python_version()
-    return out
+    return out | {name: version(name) for name in _VERSIONS}

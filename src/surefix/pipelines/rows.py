@@ -18,6 +18,7 @@ from surefix.geo.angle import wrap
 from surefix.types import BoolArray, Channel, Event, Fixes, FloatArray, IntArray, Log, Problem
 
 __all__ = [
+    "METRES_PER_DEGREE",
     "Chunk",
     "Rows",
     "Source",
@@ -28,7 +29,8 @@ __all__ = [
     "take_rows",
 ]
 
-_METRES_PER_DEGREE = 111_195.0
+METRES_PER_DEGREE = 111_195.0
+"""Of latitude, on a sphere: good enough for digits and for telling motion from rest."""
 _WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
 
 
@@ -223,7 +225,7 @@ def _place(source: Source, fixes: Fixes | None) -> FloatArray:
     if np.isnan(source.longitude) and np.isfinite(longitude).any():
         source.longitude = float(longitude[np.isfinite(longitude)][0])
     east = wrap(longitude - source.longitude) * np.cos(np.radians(latitude))
-    return np.column_stack([east, latitude]) * _METRES_PER_DEGREE
+    return np.column_stack([east, latitude]) * METRES_PER_DEGREE
 
 
 def _release(sources: list[Source]) -> Rows | None:

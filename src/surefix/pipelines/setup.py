@@ -17,9 +17,10 @@ from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows
 from surefix.types import BoolArray, Event, FloatArray, Noise
 
-__all__ = ["Setup", "localise", "settle"]
+__all__ = ["FARTHEST", "Setup", "localise", "settle"]
 
-_FARTHEST = 1e9  # m: what lies beyond is as wild as what lies there, and its square is finite
+FARTHEST = 1e9
+"""m: what lies beyond is as wild as what lies there, and its square is finite."""
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
 _FEW_HEIGHTS = 3  # heights that show an offset
@@ -78,7 +79,7 @@ def localise(
         position[:, 0], position[:, 1] = x, y
         turn = np.nan_to_num(convergence)
         velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], turn)
-    return np.clip(position, -_FARTHEST, _FARTHEST), np.clip(velocity, -_FARTHEST, _FARTHEST)
+    return np.clip(position, -FARTHEST, FARTHEST), np.clip(velocity, -FARTHEST, FARTHEST)
 
 
 def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOptions) -> Setup:

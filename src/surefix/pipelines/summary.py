@@ -8,13 +8,12 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
-from surefix.reasons import clock
+from surefix.reasons import CALENDAR_FROM, clock
 from surefix.report.headline import counts, headline
 from surefix.types import Cleaned, Event, Verdict
 
 __all__ = ["lines", "said", "span", "summary"]
 
-_CALENDAR_FROM = 1e8  # s; smaller times carry no date
 _TOP_EVENTS = 8
 
 
@@ -131,7 +130,7 @@ def span(start: float, end: float) -> str:
     """Say from when to when, with a comma in front; nothing if it is not known."""
     if not (math.isfinite(start) and math.isfinite(end)):
         return ""
-    if abs(start) < _CALENDAR_FROM:
+    if abs(start) < CALENDAR_FROM:
         return f", {start:.1f} … {end:.1f} s"
     first, last = (datetime.fromtimestamp(t, UTC) for t in (start, end))
     return f", {first:%Y-%m-%d %H:%M:%S} … {last:%Y-%m-%d %H:%M:%S} UTC"

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surefix.reasons import texts
+from surefix.reasons import CALENDAR_FROM, texts
 from surefix.report.style import MARKS
 from surefix.report.thin import extremes
 from surefix.types import Cleaned, FloatArray, IntArray, Verdict, Verdicts
@@ -29,7 +29,6 @@ __all__ = [
     "traces",
 ]
 
-_CALENDAR_FROM = 1e8  # s; smaller times count from the start of a log and carry no date
 SURE: Final = (Verdict.USED, Verdict.DOWNWEIGHTED)
 DOUBTED: Final = (Verdict.REJECTED, Verdict.EDITED)
 
@@ -87,7 +86,7 @@ def clock_of(*times: FloatArray) -> Clock:
     finite = every[np.isfinite(every)]
     if finite.size == 0:
         return Clock(False)
-    calendar = float(np.median(np.abs(finite))) >= _CALENDAR_FROM
+    calendar = float(np.median(np.abs(finite))) >= CALENDAR_FROM
     return Clock(calendar, float(finite.min()), float(finite.max()))
 
 
