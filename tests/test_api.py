@@ -188,7 +188,7 @@ def test_columns_say_what_a_table_means():
 
 
 def test_the_result_names_the_versions_it_was_made_with():
-    settings = surefix.clean({"time": [0, 1, 2], "x": [0.0, 1.0, 2.0]}).settings
+    settings = sf.clean({"time": [0, 1, 2], "x": [0.0, 1.0, 2.0]}).settings
     assert settings["surefix"] == version("surefix")
     assert settings["numpy"] == np.__version__
     assert {"python", "numba", "scipy"} <= set(settings)
