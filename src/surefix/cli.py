@@ -20,7 +20,7 @@ from surefix.errors import OptionsError, SurefixError
 if TYPE_CHECKING:
     from surefix.pipelines.options import CleanOptions
 
-__all__ = ["app", "clean", "demo", "info", "main"]
+__all__ = ["app", "clean", "demo", "info", "main", "reproduce"]
 
 app = typer.Typer(
     name="surefix",
@@ -230,6 +230,39 @@ def demo(
         typer.echo(f"  wrote {path}")
 
 
+@app.command()
+def reproduce(
+    paper: Annotated[
+        Literal["usbl", "cooperative", "towed", "ship", "radar"],
+        typer.Argument(help="Which of the five papers.", show_default=False),
+    ],
+    seed: Annotated[int, typer.Option(help="What everything is drawn from.")] = 1,
+    runs: Annotated[int, typer.Option(help="Number of independent repetitions.")] = 20,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+) -> None:
+    """Run a paper's experiment again: its methods, its baselines, and the printed figures."""
+    from surefix.papers.reproduce import reproduce as run
+    from surefix.papers.reproduce import text_lines, write_json
+
+    if report is not None:
+        _check_report(report)
+    with _repetitions(runs) as told:
+        experiment = run(paper, seed=seed, runs=runs, progress=told)
+    for line in text_lines(experiment):
+        typer.echo(line)
+    if json_file is not None:
+        write_json(experiment, json_file)
+        typer.echo(f"wrote {json_file}")
+    if report is not None:
+        from surefix.report.experiment import write_experiment
+
+        write_experiment(experiment, report)
+        typer.echo(f"wrote {report}")
+
+
 def main() -> None:
     """Run the command line; every failure ends with one line and a non-zero exit."""
     _use_utf8()
@@ -308,7 +341,7 @@ def _keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
 
 def _check_report(path: Path) -> None:
     """Refuse a report that cannot be written before the work is done."""
-    from surefix.report.page import check_extra
+    from surefix.report.shell import check_extra
 
     check_extra()
     if path.suffix.lower() not in (".html", ".htm"):
@@ -334,6 +367,20 @@ def _progress(files: list[Path], *, quiet: bool) -> Iterator[Callable[[int], Non
         transient=True,
     ) as bar:
         task = bar.add_task("", total=size)
+        yield lambda done: bar.update(task, completed=done)
+
+
+@contextmanager
+def _repetitions(runs: int) -> Iterator[Callable[[int], None] | None]:
+    """Show a bar over the repetitions, on a terminal only."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("runs", total=runs)
         yield lambda done: bar.update(task, completed=done)
 
 

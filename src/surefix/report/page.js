@@ -33,10 +33,11 @@
     "diamond-open": '<path d="M9 1.5l4.5 4.5-4.5 4.5-4.5-4.5z" fill="none" stroke-width="1.4"/>',
   };
   const swatch = (trace) => {
-    const colour = trace.fillcolor || (trace.mode === "lines" ? trace.line.color : trace.marker.color);
+    const lined = trace.mode && trace.mode.startsWith("lines");
+    const colour = trace.fillcolor || (lined ? trace.line.color : trace.marker.color);
     const dash = trace.line && trace.line.dash ? ' stroke-dasharray="4 3"' : "";
     let body = '<path d="M2 1h14v10h-14z"/>';
-    if (trace.mode === "lines" && !trace.fillcolor) {
+    if (lined && !trace.fillcolor) {
       body = `<path d="M0 6h18" stroke-width="2"${dash}/>`;
     } else if (trace.mode === "markers") {
       body = shapes[trace.marker.symbol] || shapes.circle;

@@ -1,25 +1,24 @@
-"""The report: one HTML file that holds everything it needs."""
+"""The report of a cleaned log."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path, PurePath
-from string import Template
 
 import numpy as np
 
-from surefix.errors import MissingExtraError
 from surefix.io.atomic import replacing
-from surefix.report.encode import dumps
 from surefix.report.marks import clock_of
 from surefix.report.sections import sections
+from surefix.report.shell import page
 from surefix.report.wording import escape, instant
 from surefix.types import Cleaned
 
-__all__ = ["check_extra", "write_report"]
+__all__ = ["write_report"]
+
+_FOOTER = (
+    "Made with surefix. Every fix of the input is accounted for: used, down-weighted or rejected "
+    "with its reason."
+)
 
 
 def write_report(cleaned: Cleaned, path: str | Path, *, title: str | None = None) -> None:
@@ -42,35 +41,16 @@ def write_report(cleaned: Cleaned, path: str | Path, *, title: str | None = None
         The file cannot be written.
     """
     named = ", ".join(PurePath(source).name or source for source in cleaned.sources)
-    page = _page(cleaned, title or named or "Clean track")
-    with replacing(path) as file:
-        file.write(page.encode("utf-8", "replace"))
-
-
-def check_extra() -> None:
-    """Raise the error of `write_report` if Plotly is not installed, before any work is done."""
-    if find_spec("plotly") is None:
-        raise _missing()
-
-
-def _page(cleaned: Cleaned, title: str) -> str:
-    plotly, script = _plotly(), _own("page.js")
     clock = clock_of(cleaned.track.time, *(channel.time for channel in cleaned.channels))
-    parts = sections(cleaned, clock)
-    return Template(_own("page.html")).substitute(
-        title=escape(title),
-        policy=_policy(plotly, script),
-        style=_own("page.css"),
+    text = page(
+        sections(cleaned, clock),
+        kind="Track report",
+        title=title or named or "Clean track",
         subtitle=_subtitle(cleaned),
-        contents="".join(f'<a href="#{part.name}">{part.short}</a>' for part in parts),
-        sections="\n".join(
-            f'<section id="{part.name}">\n<h2>{part.title}</h2>\n{part.body}\n</section>'
-            for part in parts
-        ),
-        figures=dumps([figure for part in parts for figure in part.figures]),
-        plotly=plotly,
-        script=script,
+        footer=_FOOTER,
     )
+    with replacing(path) as file:
+        file.write(text.encode("utf-8", "replace"))
 
 
 def _subtitle(cleaned: Cleaned) -> str:
@@ -82,34 +62,3 @@ def _subtitle(cleaned: Cleaned) -> str:
     said = [instant(float(time.min()), clock)[:10]] if clock.calendar else []
     said += [escape(", ".join(dict.fromkeys(name for name in names if name)))]
     return " · ".join(text for text in said if text)
-
-
-def _policy(*scripts: str) -> str:
-    """Content security policy: these scripts, nothing else, and nothing from anywhere."""
-    known = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-        for text in scripts
-    )
-    return (
-        f"default-src 'none'; script-src {known}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
-    )
-
-
-def _own(name: str) -> str:
-    return files("surefix.report").joinpath(name).read_text(encoding="utf-8")
-
-
-def _plotly() -> str:
-    """Plotly's own script, as its package ships it."""
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise _missing() from error
-    return str(get_plotlyjs()).replace("\r\n", "\n").replace("</script", "<\\/script")
-
-
-def _missing() -> MissingExtraError:
-    return MissingExtraError(
-        "the report needs Plotly, which is not installed", remedy="pip install 'surefix[report]'"
-    )

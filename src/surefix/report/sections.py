@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from surefix.report.consistency import histogram, innovations, quantiles
 from surefix.report.headline import headline
 from surefix.report.marks import Clock
 from surefix.report.plan import plan
 from surefix.report.series import Series, axis_series, channel_series, heading_of
+from surefix.report.shell import Section, place
 from surefix.report.stack import stacked
 from surefix.report.style import Figure
 from surefix.report.tables import (
@@ -25,34 +25,12 @@ from surefix.report.tables import (
 from surefix.report.wording import escape
 from surefix.types import Cleaned, CleanedChannel
 
-__all__ = ["Section", "sections"]
+__all__ = ["sections"]
 
 _CONSISTENCY = (
     "An innovation is the distance of a fix from where the track expected it, in standard "
     "deviations. If the noise figures are right, the believed ones follow the normal law."
 )
-
-
-class Section(NamedTuple):
-    """One part of the page.
-
-    Parameters
-    ----------
-    name
-        Anchor.
-    title
-        Heading; ``short`` is its form in the list of contents.
-    body
-        HTML.
-    figures
-        The figures that ``body`` has places for.
-    """
-
-    name: str
-    title: str
-    short: str
-    body: str
-    figures: tuple[Figure, ...] = ()
 
 
 def sections(cleaned: Cleaned, clock: Clock) -> list[Section]:
@@ -95,7 +73,7 @@ def _channels(cleaned: Cleaned, clock: Clock) -> Section:
         for i, panel in enumerate(panels)
     ]
     body = channel_table(cleaned.channels) + "".join(
-        f"<h3>{_named(channel)}</h3>{_place(figure)}"
+        f"<h3>{_named(channel)}</h3>{place(figure)}"
         for channel, figure in zip(cleaned.channels, figures, strict=True)
     )
     return Section("channels", "Depth, heading and other series", "Series", body, tuple(figures))
@@ -144,20 +122,5 @@ def _present(figures: Iterable[Figure | None]) -> tuple[Figure, ...]:
 
 def _places(figures: Iterable[Figure | None], otherwise: str = "") -> str:
     """Places for figures, filled by the page's script, or a sentence where there is none."""
-    places = "".join(_place(figure) for figure in _present(figures))
+    places = "".join(place(figure) for figure in _present(figures))
     return places or (f'<p class="none">{otherwise}</p>' if otherwise else "")
-
-
-def _place(figure: Figure) -> str:
-    outside = figure["outside"]
-    notes = [figure["note"]] if figure["note"] else []
-    if outside:
-        lie = f"{figure['what'].rstrip('s')} lies" if outside == 1 else f"{figure['what']} lie"
-        notes.insert(0, f"{outside:,} rejected {lie} outside this view.")
-    button = '<button type="button">Show everything</button>' if outside else ""
-    note = f'<p class="note">{" ".join(notes)} {button}</p>' if notes else ""
-    label = escape(figure["label"])
-    return (
-        f'<figure id="{figure["id"]}"><div class="legend"></div>'
-        f'<div class="plot" role="img" aria-label="{label}"></div>{note}</figure>'
-    )

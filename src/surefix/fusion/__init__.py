@@ -1,0 +1,1 @@
+"""Tracks and estimates of several sensors made one."""

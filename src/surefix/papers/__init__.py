@@ -1,0 +1,1 @@
+"""The five papers: each experiment run again, one file a paper."""
