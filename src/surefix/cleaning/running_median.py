@@ -40,18 +40,20 @@ class SortedWindow(NamedTuple):
         (n,) slots of the ring: the lower half from the front, the upper half from the back.
     place
         (n,) where each slot stands in ``heap``; −1 for a missing sample.
-    count
+    tally
         (3,) sizes of the lower and of the upper half, and the slot that is next.
     """
 
     value: FloatArray
     heap: IntArray
     place: IntArray
-    count: IntArray
+    tally: IntArray
 
     def copy(self) -> SortedWindow:
         """Copy the window, so that the copy can go its own way."""
-        return SortedWindow(*(part.copy() for part in self))
+        return SortedWindow(
+            self.value.copy(), self.heap.copy(), self.place.copy(), self.tally.copy()
+        )
 
 
 def sorted_window(size: int) -> SortedWindow:
@@ -118,8 +120,8 @@ def _slide(values: FloatArray, ahead: int, window: SortedWindow, medians: FloatA
 @helper
 def push(window: SortedWindow, value: float) -> None:
     """Let the newest sample in and the oldest out, in O(log n); NaN is missing."""
-    slot = window.count[2]
-    window.count[2] = slot + 1 if slot + 1 < len(window.value) else 0
+    slot = window.tally[2]
+    window.tally[2] = slot + 1 if slot + 1 < len(window.value) else 0
     changed = window.place[slot]
     if np.isnan(value):
         changed = _remove(window, changed)
@@ -128,28 +130,28 @@ def push(window: SortedWindow, value: float) -> None:
         if changed < 0:
             changed = _append(window, slot)
     if changed >= 0:
-        _settle(window.value, window.heap, window.place, changed, window.count[0], window.count[1])
+        _settle(window.value, window.heap, window.place, changed, window.tally[0], window.tally[1])
 
 
 @helper
 def middle(window: SortedWindow) -> float:
     """Median of the samples in the window; NaN where all are missing."""
-    low, high = window.count[0], window.count[1]
+    low, high = window.tally[0], window.tally[1]
     if low == 0:
         return np.nan
-    below = window.value[window.heap[0]]
+    below = float(window.value[window.heap[0]])
     if low > high:
         return below
-    return 0.5 * below + 0.5 * window.value[window.heap[len(window.heap) - 1]]
+    return 0.5 * below + 0.5 * float(window.value[window.heap[len(window.heap) - 1]])
 
 
 @helper
 def _append(window: SortedWindow, slot: int) -> int:
     """Add a slot to the half that is due, the lower one first; gives its place."""
-    count = window.count
-    lower = count[0] == count[1]
-    last = count[0] if lower else len(window.heap) - 1 - count[1]
-    count[0 if lower else 1] += 1
+    tally = window.tally
+    lower = tally[0] == tally[1]
+    last = int(tally[0] if lower else len(window.heap) - 1 - tally[1])
+    tally[0 if lower else 1] += 1
     window.heap[last] = slot
     window.place[slot] = last
     return last
@@ -160,10 +162,10 @@ def _remove(window: SortedWindow, place: int) -> int:
     """Put the last slot of the half that is due in the place of another; −1 if nothing moved."""
     if place < 0:
         return -1
-    count = window.count
-    lower = count[0] > count[1]
-    count[0 if lower else 1] -= 1
-    last = count[0] if lower else len(window.heap) - 1 - count[1]
+    tally = window.tally
+    lower = tally[0] > tally[1]
+    tally[0 if lower else 1] -= 1
+    last = tally[0] if lower else len(window.heap) - 1 - tally[1]
     slot = window.heap[last]
     window.place[window.heap[place]] = -1
     if place == last:
