@@ -42,8 +42,15 @@ def reproduce(
         raise OptionsError(f"seed {seed}", "a whole number from 0")
     if runs < 1:
         raise OptionsError(f"runs {runs}", "a whole number from 1")
-    del progress  # until the first paper is in
     match paper:
+        case "usbl":
+            from surefix.papers import usbl
+
+            return usbl.run(usbl.UsblOptions(seed=seed, runs=runs), progress)
+        case "towed":
+            from surefix.papers import towed
+
+            return towed.run(towed.TowedOptions(seed=seed, runs=runs), progress)
         case _:
             raise OptionsError(f"paper {paper!r}", f"one of {', '.join(PAPERS)}")
 

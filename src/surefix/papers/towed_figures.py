@@ -1,0 +1,155 @@
+"""Pictures of the towed sonar's experiment: figure 2 of the paper, and what it does not show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from surefix.experiment import Figure, Kind, Panel, Table, Trace
+from surefix.geo.angle import unwrap
+from surefix.models.towed import offset
+from surefix.papers.towed_methods import Estimate
+from surefix.simulate.towed import TowedSurvey
+from surefix.types import FloatArray
+
+__all__ = ["figures"]
+
+_LINES: Final = ("KF", "M eqs 19")
+_POINTS: Final = 400  # of a trace, about
+
+
+def figures(
+    survey: TowedSurvey, estimates: Mapping[str, Estimate], contamination: Table
+) -> tuple[Figure, ...]:
+    """Draw the first run, and the table of the contamination.
+
+    Parameters
+    ----------
+    survey, estimates
+        The first run: what was measured, and what each method made of it.
+    contamination
+        Ratio to the oracle, a column per share of bad values.
+    """
+    return (
+        Figure(
+            key="states",
+            title="Longitude, latitude, heading and speed with gross errors: beside figure 2",
+            panels=_states(survey, estimates),
+            columns=2,
+        ),
+        Figure(
+            key="errors",
+            title="Errors of position, heading and speed; GPS is missing in every second stretch",
+            panels=_errors(survey, estimates),
+            columns=2,
+        ),
+        Figure(
+            key="track",
+            title="Track: filtered in real time, and smoothed offline",
+            panels=(_plan(survey, estimates),),
+        ),
+        Figure(
+            key="contamination",
+            title="How much is lost to an oracle that knows the bad values",
+            panels=(_shares(contamination),),
+        ),
+    )
+
+
+def _states(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Panel, ...]:
+    """(a) longitude, (b) latitude, (c) heading, (d) speed, as in the paper."""
+    measured, true = survey.z.copy(), survey.truth[:, [0, 1, 4, 5]].copy()
+    lines = {name: estimates[name].track.mean[:, [0, 1, 4, 5]].copy() for name in _LINES}
+    measured[:, 2] = unwrap(measured[:, 2], true[:, 2], 2.0 * np.pi)
+    for values in (true, measured, *lines.values()):
+        values[:, 1] = unwrap(values[:, 1], true[0, 1], 2.0 * np.pi)
+        values[:, :3] = np.degrees(values[:, :3])
+    named = ((1, "(a) longitude, °"), (0, "(b) latitude, °"), (2, "(c) heading, °"))
+    panels = []
+    for column, label in (*named, (3, "(d) speed, m/s")):
+        x, bad = survey.time / 60.0, survey.bad[:, column]
+        traces = [
+            _thin("measured", x[~bad], measured[~bad, column], "raw"),
+            Trace("bad value", x[bad], measured[bad, column], "bad"),
+            _thin("truth", x, true[:, column], "truth"),
+            *(_thin(name, x, values[:, column]) for name, values in lines.items()),
+        ]
+        low, high = true[:, column].min(), true[:, column].max()
+        margin = (0.35 if column != 3 else 1.2) * (high - low)
+        panels.append(
+            Panel(
+                x_label="time, min",
+                y_label=label,
+                traces=tuple(traces),
+                y_range=(float(low - margin), float(high + margin)),
+            )
+        )
+    return tuple(panels)
+
+
+def _errors(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Panel, ...]:
+    names = (*_LINES, "M eqs 19 + RTS", "oracle")
+    x = survey.time / 60.0
+    panels = []
+    for label, top, columns in (
+        ("position, m", 60.0, [0, 1]),
+        ("current, m/s", 0.6, [2, 3]),
+        ("heading, °", 5.0, [4]),
+        ("speed, m/s", 0.4, [5]),
+    ):
+        traces = []
+        for name in names:
+            size = np.sqrt(np.sum(estimates[name].error[:, columns] ** 2, axis=1))
+            traces.append(_thin(name, x, np.degrees(size) if columns == [4] else size))
+        panels.append(
+            Panel(
+                x_label="time, min",
+                y_label=f"error of {label}",
+                traces=tuple(traces),
+                y_range=(0.0, top),
+            )
+        )
+    return tuple(panels)
+
+
+def _plan(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> Panel:
+    def local(position: FloatArray) -> FloatArray:
+        origin = np.broadcast_to(survey.truth[:1, :2], position.shape)
+        return np.column_stack(offset(*origin.T, *position.T))
+
+    fixes, bad = local(survey.z[:, :2]), survey.bad[:, :2].any(axis=1)
+    true = local(survey.truth[:, :2])
+    names = (*_LINES, "M eqs 19 + RTS")
+    lines = {name: local(estimates[name].track.mean[:, :2]) for name in names}
+    seen = np.all(np.abs(fixes - true.mean(axis=0)) < 0.75 * np.ptp(true, axis=0).max(), axis=1)
+    return Panel(
+        x_label="east, m",
+        y_label="north, m",
+        traces=(
+            _thin("measured", fixes[~bad, 1], fixes[~bad, 0], "raw"),
+            Trace("bad value", fixes[bad & seen, 1], fixes[bad & seen, 0], "bad"),
+            _thin("truth", true[:, 1], true[:, 0], "truth"),
+            *(_thin(name, values[:, 1], values[:, 0]) for name, values in lines.items()),
+        ),
+        equal=True,
+    )
+
+
+def _shares(table: Table) -> Panel:
+    x = np.array([float(name.split()[1]) for name in table.columns])
+    return Panel(
+        x_label="bad values, %",
+        y_label="position RMSE at the surface ÷ oracle",
+        traces=tuple(
+            Trace(name, x, values, "points")
+            for name, values in zip(table.rows, table.mean, strict=True)
+        ),
+        log_y=True,
+    )
+
+
+def _thin(name: str, x: FloatArray, y: FloatArray, kind: Kind = "line") -> Trace:
+    step = max(1, len(x) // _POINTS)
+    return Trace(name, x[::step], y[::step], kind)
