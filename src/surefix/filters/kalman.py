@@ -15,7 +15,7 @@ same arithmetic over whole series of the motion models.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,10 @@ from surefix.linalg import absorb, cholesky, solve_lower, triangularize
 from surefix.robust.loss import Loss, loss_named, weight
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["Gaussian", "Innovation", "gaussian", "predict", "update"]
+__all__ = ["Gaussian", "Innovation", "Spread", "gaussian", "predict", "update"]
+
+Spread = Literal["innovation", "noise"]
+"""What a residual is divided by before it is weighed: the root of HPHᵀ + R, or of R alone."""
 
 
 class Gaussian(NamedTuple):
@@ -51,7 +54,8 @@ class Innovation(NamedTuple):
     nis
         (groups,) squared Mahalanobis distance of each group of components.
     sigma
-        (groups,) its root, as a one-axis equivalent.
+        (groups,) what the loss weighed: its root, as a one-axis equivalent; of R alone, where the
+        spread was ``noise``.
     weight
         (groups,) weight the loss gave; NaN where not observed.
     """
@@ -98,6 +102,7 @@ def update(
     R: ArrayLike,
     loss: Loss | None = None,
     group: ArrayLike | None = None,
+    spread: Spread = "innovation",
 ) -> tuple[Gaussian, Innovation]:
     """Update with ``z = H x + v``, v of covariance R, weighting the components by a robust loss.
 
@@ -118,6 +123,9 @@ def update(
         iteration of `surefix.filters.track` and is refused here.
     group
         (m,) which components share a weight; each its own by default.
+    spread
+        What standardises the innovation: its covariance ``HPHᵀ + R``, or ``noise``, R alone. The
+        latter takes a doubtful prediction for a doubtful observation.
 
     Raises
     ------
@@ -126,6 +134,8 @@ def update(
     """
     observed = np.array(z, dtype=np.float64).reshape(-1)
     m, n = len(observed), len(x.mean)
+    if spread not in get_args(Spread):
+        raise OptionsError(f"spread {spread!r}", "one of " + ", ".join(get_args(Spread)))
     loss = loss or loss_named("kalman")
     if loss.code == 6:
         raise OptionsError(
@@ -145,7 +155,7 @@ def update(
         np.full(count, np.nan),
     )
     after = Gaussian(x.mean.copy(), np.ascontiguousarray(x.factor, dtype=np.float64).copy())
-    _update(after, seen, rows, noise, groups, loss)
+    _update(after, seen, rows, noise, groups, loss, spread == "noise")
     return after, seen
 
 
@@ -172,7 +182,13 @@ def _reduce(A: FloatArray) -> None:
 
 @kernel
 def _update(
-    x: Gaussian, seen: Innovation, H: FloatArray, R: FloatArray, group: IntArray, loss: Loss
+    x: Gaussian,
+    seen: Innovation,
+    H: FloatArray,
+    R: FloatArray,
+    group: IntArray,
+    loss: Loss,
+    by_noise: bool,
 ) -> None:
     """Weigh the groups, decorrelate what is left, absorb it one scalar at a time."""
     m, n = H.shape
@@ -196,7 +212,14 @@ def _update(
         solve_lower(C, e, size)
         scale = 1.0 if size == 1 else loss.scale2 if size == 2 else loss.scale3
         seen.nis[g] = np.sum(e * e)
-        seen.sigma[g] = np.sqrt(seen.nis[g]) / scale
+        if by_noise:
+            for i in range(size):
+                e[i] = seen.residual[index[i]]
+                for j in range(size):
+                    C[i, j] = R[index[i], index[j]]
+            cholesky(C, size)
+            solve_lower(C, e, size)
+        seen.sigma[g] = np.sqrt(np.sum(e * e)) / scale
         seen.weight[g] = weight(seen.sigma[g], loss.code, loss.k0, loss.k1)
         for i in range(size):
             component_weight[index[i]] = seen.weight[g]
