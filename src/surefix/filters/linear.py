@@ -89,10 +89,9 @@ def filter_linear(
     if rows.shape != (m, n) or step.shape != (n, n):
         raise OptionsError(f"H {rows.shape}, F {step.shape}", f"({m}, {n}) and ({n}, {n})")
     noise = np.asarray(R, dtype=np.float64)
-    for each in noise if noise.ndim == 3 else (noise,):
-        _factor(each, m, "R", definite=True)
     if noise.shape not in {(m, m), (N, m, m)}:
         raise OptionsError(f"R of shape {noise.shape}", f"({m}, {m}) or ({N}, {m}, {m})")
+    _check(noise)
     mean, factor = np.empty((N, n)), np.empty((N, n, n))
     found = Innovation(*(np.full((N, m), np.nan) for _ in Innovation._fields))
     start = Gaussian(x.mean.copy(), np.ascontiguousarray(x.factor, dtype=np.float64).copy())
@@ -102,6 +101,14 @@ def filter_linear(
     _run(start, seen, step, G, rows, every, group, loss, spread == "noise", mean, factor, found)
     covariance = factor @ np.swapaxes(factor, 1, 2)
     return LinearTrack(mean, covariance, found.residual, found.nis, found.weight)
+
+
+def _check(R: FloatArray) -> None:
+    """Refuse noise that is not finite, symmetric and positive definite at every epoch."""
+    known = bool(np.isfinite(R).all())
+    alike = known and np.allclose(R, np.swapaxes(R, -1, -2), rtol=1e-9, atol=0.0)
+    if not alike or np.linalg.eigvalsh(R).min(initial=1.0) <= 0.0:
+        raise OptionsError("R", "finite, symmetric, positive definite covariances")
 
 
 @kernel

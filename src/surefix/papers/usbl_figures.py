@@ -14,8 +14,9 @@ from surefix.types import BoolArray, FloatArray
 __all__ = ["figures"]
 
 _FIRST = ("KF", "Huber", "IGG1", "IGG3")
+_OURS = "surefix, offline"
 _AXES = ("X", "Y", "Z")
-_LABEL = "epoch, s"
+_LABEL = "time, s"
 
 
 def figures(
@@ -74,6 +75,7 @@ def _axis(track: UsblTrack, found: Mapping[str, Estimate], axis: int) -> Figure:
     name, truth = _AXES[axis], track.position[:, axis]
     middle, half = 0.5 * (truth.max() + truth.min()), 0.5 * np.ptp(truth)
     lines = {row: found[row].position[:, axis] for row in _FIRST}
+    ours = found[_OURS].position[:, axis]
     errors = tuple(Trace(row, track.time, line - truth) for row, line in lines.items())
     return Figure(
         key=f"axis-{name.lower()}",
@@ -92,10 +94,10 @@ def _axis(track: UsblTrack, found: Mapping[str, Estimate], axis: int) -> Figure:
             ),
             Panel(title="error", x_label=_LABEL, y_label="m", traces=errors),
             Panel(
-                title="error of the IGG filters",
+                title="error, close to zero",
                 x_label=_LABEL,
                 y_label="m",
-                traces=errors[2:],
+                traces=(*errors[2:], Trace(_OURS, track.time, ours - truth)),
                 y_range=(-1.0, 1.0),
             ),
         ),
@@ -103,21 +105,21 @@ def _axis(track: UsblTrack, found: Mapping[str, Estimate], axis: int) -> Figure:
 
 
 def _above(track: UsblTrack, found: Mapping[str, Estimate]) -> Figure:
-    shown = {"raw": track.fixes, "truth": track.position}
-    span = track.position[:, 1]
+    x, y = track.position[:, 0], track.position[:, 1]
+    gross = track.fixes[track.gross]
     panels = tuple(
         Panel(
             title=row,
             x_label="X, m",
             y_label="Y, m",
             traces=(
-                Trace("raw fix", shown["raw"][:, 0], shown["raw"][:, 1], "raw"),
+                Trace("gross error", gross[:, 0], gross[:, 1], "bad"),
                 Trace("filtered", found[row].position[:, 0], found[row].position[:, 1]),
-                Trace("truth", shown["truth"][:, 0], shown["truth"][:, 1], "truth"),
+                Trace("truth", x, y, "truth"),
             ),
-            y_range=(float(span.min()) - 35.0, float(span.max()) + 35.0),
+            y_range=(float(y.min()) - 35.0, float(y.max()) + 35.0),
         )
-        for row in ("KF", "Huber", "IGG3", "surefix, offline")
+        for row in ("KF", "Huber", "IGG3", _OURS)
     )
     return Figure(key="above", title="The track seen from above", panels=panels, columns=2)
 

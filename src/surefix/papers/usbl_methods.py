@@ -110,20 +110,21 @@ def estimate(
     step = float(track.time[1] - track.time[0])
     G = noise_factor("cv", 3, step, PROCESS**2)
     Q = G @ G.T if reading.q is None else reading.q * np.eye(6)
-    R = _sensor_noise(track) if reading.sensors else np.tile(np.eye(6), (len(z), 1, 1))
+    R = _sensor_noise(track) if reading.sensors else np.eye(6)
+    first = R[0] if reading.sensors else R
     found = filter_linear(
-        gaussian(z[0], R[0]),
+        gaussian(z[0], first),
         z[1:],
         transition("cv", 3, step),
         Q,
         np.eye(6),
-        R[1:],
+        R[1:] if reading.sensors else R,
         loss_named(METHODS[row], **_constants(row, reading)),
         reading.spread,
     )
     return Estimate(
         np.vstack([z[:1, :3], found.mean[:, :3]]),
-        np.concatenate([R[:1, :3, :3], found.covariance[:, :3, :3]]),
+        np.concatenate([first[None, :3, :3], found.covariance[:, :3, :3]]),
     )
 
 

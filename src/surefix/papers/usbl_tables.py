@@ -190,7 +190,7 @@ def tables(runs: Sequence[Figures]) -> tuple[Table, ...]:
         ),
         make(
             "readings_rmse_m", "RMSE by reading, mean of the axes", FIRST, printed=mean_m,
-            note="Each row changes the first in what it names; the last has k0 = 1.5, k1 = 4.5 too.",
+            note="Each row changes the first in what it names; the last has k0, k1 = 1.5, 4.5 too.",
         ),
         make(
             "readings_rejected_pct", "Gross errors rejected by reading, mean of the axes", FIRST,
