@@ -119,7 +119,7 @@ def run(options: TowedOptions, progress: Progress | None = None) -> Experiment:
             "ratio": _ratios(estimates),
             "position_m": {name: stretches(survey, e) for name, e in estimates.items()},
             "nees": {name: nees(e) for name, e in estimates.items()},
-            "contamination_ratio": _contaminated(options, seed),
+            **_contaminated(options, seed),
             "state_side_m": _state_side(options, seed),
         }
         done.append(figures_of_merit)
@@ -134,7 +134,7 @@ def run(options: TowedOptions, progress: Progress | None = None) -> Experiment:
         seed=options.seed,
         runs=options.runs,
         tables=tables,
-        figures=figures(*first, tables[4]),
+        figures=figures(*first, tables[4:6]),
         findings=_findings(options, {table.key: table for table in tables}),
     )
 
@@ -168,16 +168,19 @@ def _ratios(estimates: dict[str, Estimate]) -> dict[str, FloatArray]:
     return out
 
 
-def _contaminated(options: TowedOptions, seed: int) -> dict[str, list[float]]:
-    """Position RMSE at the surface over the oracle's, for each share of bad values."""
-    out: dict[str, list[float]] = {name: [] for name in _SHARED}
+def _contaminated(options: TowedOptions, seed: int) -> dict[str, dict[str, list[float]]]:
+    """RMSE of position at the surface and of heading over the oracle's, for each share ε."""
+    place: dict[str, list[float]] = {name: [] for name in _SHARED}
+    heading: dict[str, list[float]] = {name: [] for name in _SHARED}
     for share in _SHARES:
         survey = _survey(options, seed, contamination=share)
-        best = position_rmse(estimate(survey, ORACLE), survey.surfaced)
+        best = estimate(survey, ORACLE)
         for name in _SHARED:
             found = estimate(survey, name, options.k0)
-            out[name].append(position_rmse(found, survey.surfaced) / best)
-    return out
+            up = survey.surfaced
+            place[name].append(position_rmse(found, up) / position_rmse(best, up))
+            heading[name].append(state_rmse(found)[4] / state_rmse(best)[4])
+    return {"position_ratio": place, "heading_ratio": heading}
 
 
 def _state_side(options: TowedOptions, seed: int) -> dict[str, list[float]]:
@@ -202,6 +205,7 @@ def _state_side(options: TowedOptions, seed: int) -> dict[str, list[float]]:
 
 def _tables(options: TowedOptions, done: list[dict[str, Any]]) -> tuple[Table, ...]:
     bad = f"{100 * options.contamination:g} % bad"
+    shares = tuple(f"ε {100 * share:g} %" for share in _SHARES)
     low, high = mean_bounds(6, options.runs)
     shown: tuple[tuple[str, str, tuple[str, ...], dict[str, Any]], ...] = (
         ("rmse", "RMSE of the states", _STATES, {"note": "measured: GPS at the surface only"}),
@@ -228,9 +232,15 @@ def _tables(options: TowedOptions, done: list[dict[str, Any]]) -> tuple[Table, .
             },
         ),
         (
-            "contamination_ratio",
+            "position_ratio",
             "Position RMSE at the surface, multiple of the oracle's",
-            tuple(f"ε {100 * share:g} %" for share in _SHARES),
+            shares,
+            {"digits": 2},
+        ),
+        (
+            "heading_ratio",
+            "Heading RMSE, multiple of the oracle's",
+            shares,
             {"digits": 2},
         ),
         (

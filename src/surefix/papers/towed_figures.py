@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from surefix.experiment import Figure, Kind, Panel, Table, Trace
-from surefix.geo.angle import unwrap
+from surefix.geo.angle import unwrap, wrap
 from surefix.models.towed import offset
 from surefix.papers.towed_methods import Estimate
 from surefix.simulate.towed import TowedSurvey
@@ -18,10 +18,11 @@ __all__ = ["figures"]
 
 _LINES: Final = ("KF", "M eqs 19")
 _POINTS: Final = 400  # of a trace, about
+_SHOWN: Final = 330.0  # s, the first line and turn
 
 
 def figures(
-    survey: TowedSurvey, estimates: Mapping[str, Estimate], contamination: Table
+    survey: TowedSurvey, estimates: Mapping[str, Estimate], contamination: Sequence[Table]
 ) -> tuple[Figure, ...]:
     """Draw the first run, and the table of the contamination.
 
@@ -30,12 +31,13 @@ def figures(
     survey, estimates
         The first run: what was measured, and what each method made of it.
     contamination
-        Ratio to the oracle, a column per share of bad values.
+        Ratios to the oracle, of position and heading: a column per share of bad values.
     """
     return (
         Figure(
             key="states",
-            title="Longitude, latitude, heading and speed with gross errors: beside figure 2",
+            title="Longitude, latitude, heading and speed with gross errors: beside figure 2; "
+            "the body dives after 4 min",
             panels=_states(survey, estimates),
             columns=2,
         ),
@@ -52,24 +54,31 @@ def figures(
         ),
         Figure(
             key="contamination",
-            title="How much is lost to an oracle that knows the bad values",
-            panels=(_shares(contamination),),
+            title="How much is lost to an oracle that knows the bad values; position at the surface",
+            panels=tuple(map(_shares, contamination, ("position", "heading"))),
+            columns=2,
         ),
     )
 
 
 def _states(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Panel, ...]:
     """(a) longitude, (b) latitude, (c) heading, (d) speed, as in the paper."""
-    measured, true = survey.z.copy(), survey.truth[:, [0, 1, 4, 5]].copy()
-    lines = {name: estimates[name].track.mean[:, [0, 1, 4, 5]].copy() for name in _LINES}
+    rows = survey.time <= _SHOWN
+    measured, true = survey.z[rows], survey.truth[rows][:, [0, 1, 4, 5]]
+    lines = {name: estimates[name].track.mean[rows][:, [0, 1, 4, 5]] for name in _LINES}
     measured[:, 2] = unwrap(measured[:, 2], true[:, 2], 2.0 * np.pi)
+    start = np.round(np.degrees(true[0, :2]), 2)
     for values in (true, measured, *lines.values()):
-        values[:, 1] = unwrap(values[:, 1], true[0, 1], 2.0 * np.pi)
         values[:, :3] = np.degrees(values[:, :3])
-    named = ((1, "(a) longitude, °"), (0, "(b) latitude, °"), (2, "(c) heading, °"))
+        values[:, :2] = 1e3 * wrap(values[:, :2] - start)
     panels = []
-    for column, label in (*named, (3, "(d) speed, m/s")):
-        x, bad = survey.time / 60.0, survey.bad[:, column]
+    for column, label in (
+        (1, f"(a) longitude less {start[1]:g}°, 10⁻³ °"),
+        (0, f"(b) latitude less {start[0]:g}°, 10⁻³ °"),
+        (2, "(c) heading, °"),
+        (3, "(d) speed, m/s"),
+    ):
+        x, bad = survey.time[rows] / 60.0, survey.bad[rows, column]
         traces = [
             _thin("measured", x[~bad], measured[~bad, column], "raw"),
             Trace("bad value", x[bad], measured[bad, column], "bad"),
@@ -77,7 +86,7 @@ def _states(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Pan
             *(_thin(name, x, values[:, column]) for name, values in lines.items()),
         ]
         low, high = true[:, column].min(), true[:, column].max()
-        margin = (0.35 if column != 3 else 1.2) * (high - low)
+        margin = (0.5 if column != 3 else 1.2) * (high - low)
         panels.append(
             Panel(
                 x_label="time, min",
@@ -137,11 +146,11 @@ def _plan(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> Panel:
     )
 
 
-def _shares(table: Table) -> Panel:
+def _shares(table: Table, what: str) -> Panel:
     x = np.array([float(name.split()[1]) for name in table.columns])
     return Panel(
         x_label="bad values, %",
-        y_label="position RMSE at the surface ÷ oracle",
+        y_label=f"{what} RMSE ÷ oracle",
         traces=tuple(
             Trace(name, x, values, "points")
             for name, values in zip(table.rows, table.mean, strict=True)
