@@ -208,42 +208,59 @@ def m_step(
     L = np.empty((count, count))
     rows = np.empty((count, n + 1))  # whitened: [R^{-1/2} H L | R^{-1/2} residual]
     for i in range(count):
-        rows[i, :n] = H[seen[i]] @ S
+        for j in range(n):
+            rows[i, j] = 0.0
+            for l in range(j, n):
+                rows[i, j] += H[seen[i], l] * S[l, j]
         rows[i, n] = residual[seen[i]]
         for j in range(count):
             L[i, j] = R[seen[i], seen[j]]
     if not cholesky(L, count):
         return -1, 0.0
     for i in range(count):
-        for l in range(i):
-            rows[i] -= L[i, l] * rows[l]
-        rows[i] /= L[i, i]
+        for k in range(n + 1):
+            for l in range(i):
+                rows[i, k] -= L[i, l] * rows[l, k]
+            rows[i, k] /= L[i, i]
     e, D = np.zeros(n), np.zeros((n, n))
     moved, phi, gain = np.empty(n), np.empty(n), np.empty(n)
     change, done = np.inf, 0
     while done < sweeps and change > tolerance:
         done += 1
-        D[:] = 0.0
         for i in range(n):
+            D[i] = 0.0
             w_state[i] = _weight(abs(e[i]), state_loss)
             D[i, i] = 1.0 / math.sqrt(w_state[i])
-        moved[:] = 0.0
+            moved[i] = 0.0
         for i in range(count):
-            row = rows[i, :n]
-            scale = 1.0
-            if by_innovation == 1:
-                scale = math.sqrt(1.0 + np.sum(row * row))
-            w[seen[i]] = _weight(abs(rows[i, n] - np.sum(row * e)) / scale, loss)
+            scale2 = 1.0
+            for k in range(n):
+                scale2 += by_innovation * rows[i, k] * rows[i, k]
+            r = abs(_remainder(rows[i], e)) / math.sqrt(scale2)
+            w[seen[i]] = _weight(r, loss)
         for i in range(count):
             if w[seen[i]] > 0.0:
-                row = rows[i, :n]
-                phi[:] = D.T @ row
-                absorb(moved, D, phi, gain, rows[i, n] - np.sum(row * moved), 1.0 / w[seen[i]])
-        change = np.max(np.abs(moved - e))
-        e[:] = moved
+                for k in range(n):
+                    phi[k] = 0.0
+                    for l in range(n):
+                        phi[k] += D[l, k] * rows[i, l]
+                absorb(moved, D, phi, gain, _remainder(rows[i], moved), 1.0 / w[seen[i]])
+        change = 0.0
+        for k in range(n):
+            change = max(change, abs(moved[k] - e[k]))
+            e[k] = moved[k]
     x += S @ e
     S[:] = S @ D
     return done, change
+
+
+@helper
+def _remainder(row: FloatArray, e: FloatArray) -> float:
+    """What a whitened observation, the last of its row, differs from what the states say."""
+    total: float = row[-1]
+    for k in range(e.shape[0]):
+        total -= row[k] * e[k]
+    return total
 
 
 @helper
