@@ -51,6 +51,14 @@ def reproduce(
             from surefix.papers import towed
 
             return towed.run(towed.TowedOptions(seed=seed, runs=runs), progress)
+        case "cooperative":
+            from surefix.papers import cooperative
+
+            return cooperative.run(cooperative.CooperativeOptions(seed=seed, runs=runs), progress)
+        case "ship":
+            from surefix.papers import ship
+
+            return ship.run(ship.ShipPaperOptions(seed=seed, runs=runs), progress)
         case _:
             raise OptionsError(f"paper {paper!r}", f"one of {', '.join(PAPERS)}")
 
