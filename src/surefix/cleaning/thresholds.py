@@ -42,7 +42,7 @@ def spacing(time: ArrayLike) -> FloatArray:
     if not good.any():
         return np.full(steps.size + 1, np.nan)
     steps = np.where(good, steps, np.median(steps[good]))
-    return np.maximum(np.append(steps[0], steps), np.append(steps, steps[-1]))
+    return np.asarray(np.maximum(np.append(steps[0], steps), np.append(steps, steps[-1])))
 
 
 def rate_threshold(time: ArrayLike, rate: float) -> FloatArray:

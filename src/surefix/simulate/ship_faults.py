@@ -43,7 +43,7 @@ class Faults(NamedTuple):
     @property
     def good(self) -> BoolArray:
         """(n,) samples with nothing wrong."""
-        return (self.burst == 0) & ~self.stuck & ~self.lost & ~self.invalid
+        return np.asarray((self.burst == 0) & ~self.stuck & ~self.lost & ~self.invalid)
 
 
 class Disturbed(NamedTuple):
