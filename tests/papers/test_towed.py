@@ -42,8 +42,8 @@ def test_the_oracle_is_honest_and_the_kalman_filter_is_not(small):
 
 def test_the_state_side_helps_against_kicks_and_hurts_with_bad_fixes(small):
     both, fixes = "M iterated, W₁ W₂", "M iterated, W₂"
-    assert figure(small, "state_side_m", both, 1) < 0.6 * figure(small, "state_side_m", fixes, 1)
-    assert figure(small, "state_side_m", both, 2) > 1.5 * figure(small, "state_side_m", fixes, 2)
+    assert figure(small, "state_side_m", both, 2) < 0.6 * figure(small, "state_side_m", fixes, 2)
+    assert figure(small, "state_side_m", both, 3) > 1.5 * figure(small, "state_side_m", fixes, 3)
 
 
 def test_smoothing_mends_the_dives(small):

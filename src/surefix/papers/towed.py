@@ -11,7 +11,7 @@ import numpy as np
 from surefix.errors import OptionsError
 from surefix.experiment import Experiment, Progress, Table, gather
 from surefix.metrics import mean_bounds
-from surefix.models.towed import towed_model
+from surefix.models.towed import STATES, towed_model
 from surefix.papers.towed_figures import figures
 from surefix.papers.towed_methods import (
     AGAIN_S,
@@ -29,11 +29,11 @@ from surefix.types import FloatArray
 __all__ = ["TowedOptions", "run"]
 
 _SOURCE: Final = (
-    "Zhu, Huang and Zhang, Motion estimation of synthetic aperture sonar with a robust Kalman "
+    "Zhu, Huang and Zhang, Synthetic aperture sonar movement estimation using the robust Kalman "
     "filter, J. Xidian University 34(3), 2007 (paper 002)"
 )
 _TITLE: Final = "Position, heading, speed and current of a towed sonar from GPS, compass and log"
-_STATES: Final = ("latitude m", "longitude m", "v_N m/s", "v_E m/s", "heading °", "speed m/s")
+_UNITS: Final = ("m", "m", "m/s", "m/s", "°", "m/s")
 _SHARES: Final = (0.0, 0.05, 0.1, 0.2)
 
 KF, PRINTED, W2, BOTH = "KF", "M eqs 19", "M iterated, W₂", "M iterated, W₁ W₂"
@@ -193,6 +193,7 @@ def _state_side(options: TowedOptions, seed: int) -> dict[str, list[float]]:
         "model": towed_model(position=0.25),
     }
     surveys = (
+        _survey(options, seed, gust_mps=options.gust_mps, contamination=0.0),
         _survey(options, seed, gust_mps=options.gust_mps),
         _survey(options, seed, contamination=0.0, **kicked),
         _survey(options, seed, **kicked),
@@ -205,14 +206,15 @@ def _state_side(options: TowedOptions, seed: int) -> dict[str, list[float]]:
 
 def _tables(options: TowedOptions, done: list[dict[str, Any]]) -> tuple[Table, ...]:
     bad = f"{100 * options.contamination:g} % bad"
+    states = tuple(f"{name} {unit}" for name, unit in zip(STATES, _UNITS, strict=True))
     shares = tuple(f"ε {100 * share:g} %" for share in _SHARES)
     low, high = mean_bounds(6, options.runs)
     shown: tuple[tuple[str, str, tuple[str, ...], dict[str, Any]], ...] = (
-        ("rmse", "RMSE of the states", _STATES, {"note": "measured: GPS at the surface only"}),
+        ("rmse", "RMSE of the states", states, {"note": "measured: GPS at the surface only"}),
         (
             "ratio",
             "RMSE as a multiple of the oracle's",
-            tuple(name.rsplit(" ", 1)[0] for name in _STATES),
+            STATES,
             {"digits": 2, "note": "with RTS: of the oracle's with RTS"},
         ),
         (
@@ -246,7 +248,7 @@ def _tables(options: TowedOptions, done: list[dict[str, Any]]) -> tuple[Table, .
         (
             "state_side_m",
             "Position RMSE at the surface when the motion goes wrong",
-            (f"gust, {bad}", "kicks, 0 % bad", f"kicks, {bad}"),
+            tuple(f"{what}, {share}" for what in ("gust", "kicks") for share in ("0 % bad", bad)),
             {
                 "unit": "m",
                 "digits": 2,
@@ -280,8 +282,8 @@ def _findings(options: TowedOptions, tables: dict[str, Table]) -> tuple[str, ...
         f"A loss that rejects, in eqs 19: {at(place, IGG3, 0):.0f} m at the surface, because "
         "residuals over R alone reject every fix after a dive.",
         f"W₁ acts where the motion is as uncertain as the fix: with kicks and good fixes it takes "
-        f"the iterated filter from {at(kicks, W2, 1):.2f} m to {at(kicks, BOTH, 1):.2f} m; with "
-        f"bad fixes among them, from {at(kicks, W2, 2):.2f} m to {at(kicks, BOTH, 2):.2f} m.",
+        f"the iterated filter from {at(kicks, W2, 2):.2f} m to {at(kicks, BOTH, 2):.2f} m; with "
+        f"bad fixes among them, from {at(kicks, W2, 3):.2f} m to {at(kicks, BOTH, 3):.2f} m.",
         f"Smoothed offline, the position below is {at(place, PRINTED + RTS, 2):.2f} m off "
         f"instead of {at(place, PRINTED, 2):.2f} m.",
     )
