@@ -10,7 +10,16 @@ from surefix.filters.track import blank, filter_track, start
 from surefix.robust.loss import Loss
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["from_filtered", "from_smoothed", "lagged", "realtime"]
+__all__ = [
+    "from_filtered",
+    "from_smoothed",
+    "lagged",
+    "realtime",
+    "rows_of",
+    "smoothed_stretch",
+    "state_before",
+    "write_rows",
+]
 
 _BLOCK = 5000  # epochs filtered in one call while waiting for a recovery
 
@@ -72,15 +81,15 @@ def lagged(
     parts: list[Estimate] = []
     state, head, done = start(motion, recovery), 0, 0
     while head < n:
-        rows = _rows(epochs, head, min(head + _BLOCK, n))
+        rows = rows_of(epochs, head, min(head + _BLOCK, n))
         state, out, count = filter_track(motion, loss, recovery, rows, state, until_recovery=True)
-        _write(kept, head, out, count)
+        write_rows(kept, head, out, count)
         head += count
         jumped = kept.jump[head - 1] & ~epochs.jump[head - 1]
         if not jumped:
             continue
         ready = max(int(np.searchsorted(last, head - 1)), done)
-        parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, ready))
+        parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, ready))
         done = ready
         began = kept.since[head - 1].copy()
         first = np.maximum(np.searchsorted(time, began), done)
@@ -88,16 +97,17 @@ def lagged(
             epochs.jump[first[g]] |= 1 << g
             since[first[g], g] = began[g]
         begin = int(first[np.isfinite(began)].min())
-        before = _state_before(motion, recovery, time, kept, begin, state)
-        again = _rows(epochs, begin, head)
+        before = state_before(motion, recovery, time, kept, begin, state)
+        again = rows_of(epochs, begin, head)
         state, redo, count = filter_track(motion, loss, recovery, again, before)
-        _write(kept, begin, redo, count)
+        write_rows(kept, begin, redo, count)
         kept.since[begin:head] = np.fmin(kept.since[begin:head], since[begin:head])
-    parts.append(_smoothed(motion, recovery, time, kept, last, wanted, done, n))
+    parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, n))
     return Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
-def _rows(epochs: Epochs, first: int, last: int) -> Epochs:
+def rows_of(epochs: Epochs, first: int, last: int) -> Epochs:
+    """Epochs ``first`` … ``last`` − 1."""
     return Epochs(*(field[first:last] for field in epochs))  # type: ignore[arg-type]
 
 
@@ -105,12 +115,13 @@ def _cut(filtered: Filtered, first: int, last: int) -> Filtered:
     return Filtered(*(field[first:last] for field in filtered))  # type: ignore[arg-type]
 
 
-def _write(kept: Filtered, at: int, out: Filtered, count: int) -> None:
+def write_rows(kept: Filtered, at: int, out: Filtered, count: int) -> None:
+    """Put the first ``count`` epochs of ``out`` in the place of those of ``kept`` from ``at`` on."""
     for whole, part in zip(kept, out, strict=True):
         whole[at : at + count] = part[:count]
 
 
-def _smoothed(
+def smoothed_stretch(
     motion: Motion,
     recovery: Recovery,
     time: FloatArray,
@@ -136,7 +147,7 @@ def _smoothed(
     return decided._replace(mean=mean, sigma=sigma)
 
 
-def _state_before(
+def state_before(
     motion: Motion,
     recovery: Recovery,
     time: FloatArray,

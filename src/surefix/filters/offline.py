@@ -21,7 +21,7 @@ from surefix.models.motion import add_noise_factor, propagate_rows
 from surefix.robust.loss import Loss, weights
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["offline"]
+__all__ = ["backward", "needed_jumps", "offline"]
 
 _SWEEPS = 8
 _STILL = 0.02  # largest change of a weight that counts as standing still
@@ -48,9 +48,9 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
         smoothed = smooth(motion, recovery, epochs.time, first)
         return _judged(motion, loss, epochs, first, smoothed)
     fixed, jump = _dated_back(epochs, first)
-    backward = _reversed(motion, epochs)
-    _, last, _ = filter_track(motion, loss, recovery, backward, start(motion, recovery))
-    against, back = _dated_back(backward, last)
+    mirrored = backward(motion, epochs)
+    _, last, _ = filter_track(motion, loss, recovery, mirrored, start(motion, recovery))
+    against, back = _dated_back(mirrored, last)
     jump |= _only_backward(motion, epochs, jump, back[::-1], recovery.after)
     doubted = np.fmin(fixed, against[::-1])
     doubted[doubted < _DOUBT] = 0.0
@@ -61,7 +61,7 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
         _, filtered, _ = filter_track(motion, loss, recovery, decided, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered)
         found = _judged(motion, loss, epochs, filtered, smoothed)
-        jump = _needed(motion, epochs, decided.jump, smoothed)
+        jump = needed_jumps(motion, epochs, decided.jump, smoothed)
         if not np.array_equal(jump, decided.jump):
             decided = decided._replace(jump=jump)
             continue
@@ -73,18 +73,20 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
     return found
 
 
-def _reversed(motion: Motion, epochs: Epochs) -> Epochs:
+def backward(motion: Motion, epochs: Epochs) -> Epochs:
     """Give the series as one sees it who travels back in time: velocities change sign."""
     sign = np.repeat([1.0, -1.0], motion.axes)
     jump = np.zeros_like(epochs.jump)
     jump[1:] = epochs.jump[:0:-1]
-    return Epochs(
+    parts = (
         -epochs.time[::-1],
         epochs.z[::-1] * sign,
         epochs.variance[::-1],
         epochs.fixed[::-1],
         jump,
+        epochs.sensor[::-1],
     )
+    return Epochs(*(np.ascontiguousarray(part) for part in parts))
 
 
 def _only_backward(
@@ -170,7 +172,7 @@ def _reweighted(
     return fixed
 
 
-def _needed(motion: Motion, epochs: Epochs, jump: IntArray, smoothed: Smoothed) -> IntArray:
+def needed_jumps(motion: Motion, epochs: Epochs, jump: IntArray, smoothed: Smoothed) -> IntArray:
     """The jumps across which the smoothed track does not agree with itself."""
     needed = jump.copy()
     for k in np.flatnonzero(jump).tolist():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["Epochs", "Estimate", "Filtered", "Motion", "Recovery", "TrackState"]
@@ -45,10 +47,13 @@ class Recovery(NamedTuple):
         Seconds of unbroken rejection; infinity for never.
     sigma_velocity
         Standard deviation of a velocity nothing is known about, m/s.
+    keeps_rate
+        Whether the velocity goes on over a jump that the epochs fix beforehand.
     """
 
     after: float
     sigma_velocity: float
+    keeps_rate: bool = False
 
 
 class Epochs(NamedTuple):
@@ -66,6 +71,8 @@ class Epochs(NamedTuple):
         (n, groups) weights decided beforehand (0 rejects, 1 uses); NaN lets the loss decide.
     jump
         (n,) bit mask of the groups whose state restarts before this epoch.
+    sensor
+        (n,) which sensor each came from, 0 … 61; empty if all came from one.
     """
 
     time: FloatArray
@@ -73,6 +80,7 @@ class Epochs(NamedTuple):
     variance: FloatArray
     fixed: FloatArray
     jump: IntArray
+    sensor: IntArray = np.empty(0, np.int64)
 
 
 class TrackState(NamedTuple):
@@ -148,6 +156,9 @@ class Estimate(NamedTuple):
         (n, m) the same per component, signed.
     jump, since
         (n,) bit mask of groups that restarted here, and (n, groups) when the run began.
+    run
+        (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none,
+        empty from a filter that knows no runs.
     """
 
     mean: FloatArray
@@ -157,3 +168,4 @@ class Estimate(NamedTuple):
     standardised: FloatArray
     jump: IntArray
     since: FloatArray
+    run: IntArray = np.empty(0, np.int64)  # noqa: RUF012

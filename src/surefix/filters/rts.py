@@ -90,20 +90,20 @@ def _backward(
     back = _Backward(
         np.zeros((n, states, states)), np.zeros((n, states, states)), np.zeros((n, states))
     )
-    _reduce(motion, recovery.sigma_velocity, time, filtered, back)
+    _reduce(motion, recovery, time, filtered, back)
     return back
 
 
 @kernel
 def _reduce(
-    motion: Motion, sigma_velocity: float, time: FloatArray, filtered: Filtered, back: _Backward
+    motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered, back: _Backward
 ) -> None:
     """Reduce ``[[F S, G], [S, 0]]`` to ``[[L, 0], [Y, D]]``: gain ``Y L⁻¹``, floor ``D Dᵀ``."""
     epochs, n = filtered.mean.shape
     A = np.empty((2 * n, 2 * n))
     for k in range(epochs - 1):
         S, dt = filtered.factor[k], time[k + 1] - time[k]
-        predict_factor(A, S, motion, dt, filtered.jump[k + 1], sigma_velocity)
+        predict_factor(A, S, motion, dt, filtered.jump[k + 1], recovery)
         for i in range(n):
             back.predicted[k, i] = filtered.mean[k, i]
             for j in range(n):

@@ -61,24 +61,50 @@ def _vague(
 
 
 @helper
+def _displace(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
+    """Forget the positions of the masked groups alone; the noise of the rates becomes their own."""
+    d, n = motion.axes, motion.order * motion.axes
+    for c in range(d):
+        if not (mask >> motion.group[c]) & 1:
+            continue
+        for j in range(2 * n):
+            A[c, j] = 0.0
+        root = math.sqrt(motion.density[c] * dt)
+        v = d + c
+        A[v, n + c] = 0.0
+        if motion.order == 3:
+            a = 2 * d + c
+            A[a, n + c] = 0.0
+            A[v, n + v] = root * dt / math.sqrt(3.0)
+            A[a, n + v] = root * math.sqrt(3.0) / 2.0
+            A[a, n + a] = root / 2.0
+        else:
+            A[v, n + v] = root
+        A[c, n + c] = VAGUE
+
+
+@helper
 def predict_factor(
     A: FloatArray,
     S: FloatArray,
     motion: Motion,
     dt: float,
     jump: int,
-    sigma_velocity: float,
+    recovery: Recovery,
 ) -> None:
     """Write ``[F S, G]`` into ``A`` (n, 2n): a factor of the predicted covariance, not yet square.
 
-    Groups in the bit mask ``jump`` restart: their rows become vague and independent of the past.
+    Groups in the bit mask ``jump`` restart: their rows become vague and independent of the past,
+    or only those of their positions if ``recovery.keeps_rate``.
     """
     n = motion.order * motion.axes
     _load(A, S, n)
     propagate_rows(A, motion.order, motion.axes, dt, n)
     add_noise_factor(A, motion.order, motion.axes, dt, motion.density, n)
-    if jump:
-        _vague(A, motion, jump, VAGUE, sigma_velocity)
+    if jump and recovery.keeps_rate:
+        _displace(A, motion, dt, jump)
+    elif jump:
+        _vague(A, motion, jump, VAGUE, recovery.sigma_velocity)
 
 
 @helper
@@ -296,7 +322,7 @@ def run(
         time = epochs.time[k]
         jump = epochs.jump[k]
         if dt > 0.0 or jump:
-            predict_factor(A, state.factor, motion, dt, jump, recovery.sigma_velocity)
+            predict_factor(A, state.factor, motion, dt, jump, recovery)
             triangularize(A, n, 2 * n)
             _store(state.factor, A, n)
             propagate_rows(state.mean.reshape(n, 1), motion.order, d, dt, 1)

@@ -1,0 +1,171 @@
+"""Records of the multi-hypothesis filter: what it supposes, what it remembers, what it finds."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from surefix.filters.records import Motion
+from surefix.types import BoolArray, FloatArray, IntArray
+
+__all__ = [
+    "COMMIT",
+    "CONTINUE",
+    "DROP",
+    "MOST",
+    "OPEN",
+    "VELOCITY_OUT",
+    "Bank",
+    "Found",
+    "Prior",
+    "Trail",
+    "no_hypotheses",
+]
+
+MOST: Final = 64
+"""Hypotheses kept after each epoch."""
+
+# What a hypothesis says of an epoch: bits 0 … 2 are the axes of the position that are wrong by
+# themselves; the others say what became of a run of fixes with a common offset.
+OPEN: Final = 8
+CONTINUE: Final = 16
+DROP: Final = 32
+COMMIT: Final = 64
+VELOCITY_OUT: Final = 128
+
+
+class Prior(NamedTuple):
+    """What is supposed before any observation is seen.
+
+    Parameters
+    ----------
+    isolated
+        Probability that a fix is wrong by itself, on all its axes.
+    partial
+        Probability that only some of its axes are.
+    burst
+        Probability that a run of fixes with a common offset begins.
+    ending
+        Probability that such a run ends with the next fix.
+    longest
+        Longest run, s: what lasts longer is a true jump, dated back to its first fix. No run may
+        outlast the track that it contradicts.
+    velocity, again
+        Probability that a velocity is wrong, and that it is if the last one was.
+    spread
+        (2·axes,) scale of the gross errors per component, m and m/s.
+    sigma_velocity
+        Standard deviation of a velocity nothing is known about, m/s.
+    """
+
+    isolated: float
+    partial: float
+    burst: float
+    ending: float
+    longest: float
+    velocity: float
+    again: float
+    spread: FloatArray
+    sigma_velocity: float
+
+
+class Bank(NamedTuple):
+    """All the filter remembers: k hypotheses, their best one not necessarily first.
+
+    Each holds the state of every axis ``[p, v, (a), b]`` by itself, b the offset of a run; axes do
+    not influence each other but through the decisions.
+
+    Parameters
+    ----------
+    time
+        (1,) s; NaN before the first epoch.
+    number
+        (1,) how many of the k are in use.
+    weight
+        (k,) logarithms, their exponentials sum to 1.
+    mean, covariance
+        (k, axes, order + 1) and (k, axes, order + 1, order + 1).
+    seen
+        (k, axes) whether the position of the axis is known at all.
+    began
+        (k,) s, when its track began: the first fix, or the last jump.
+    run
+        (k,) sensor whose fixes run with a common offset, −1 outside of runs.
+    opened
+        (k,) s, when that run began.
+    length
+        (k,) fixes of the run so far.
+    faulty
+        (k,) bit mask of the sensors whose last velocity was wrong.
+    announced
+        (1,) s, the beginning of the track as it was last told.
+    """
+
+    time: FloatArray
+    number: IntArray
+    weight: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    seen: BoolArray
+    began: FloatArray
+    run: IntArray
+    opened: FloatArray
+    length: IntArray
+    faulty: IntArray
+    announced: FloatArray
+
+
+class Trail(NamedTuple):
+    """Where hypotheses came from: (n, k) previous place and code of each, and (n,) the best."""
+
+    parent: IntArray
+    code: IntArray
+    best: IntArray
+
+
+class Found(NamedTuple):
+    """What the mixture of hypotheses says of each of n epochs.
+
+    Parameters
+    ----------
+    mean, sigma
+        (n, states) mean and standard deviations of the mixture; NaN where nothing is known.
+    weight
+        (n, 2·axes) probability that the component belongs to the track; NaN where not observed.
+    standardised
+        (n, 2·axes) innovation of the likeliest hypothesis over its standard deviation.
+    evidence
+        (n,) log-likelihood of the epoch's observations given those before.
+    run
+        (n,) fixes so far of the run that the epoch's fix belongs to, 0 if to none.
+    since
+        (n,) s, where the likeliest hypothesis just took a run for a true jump: when that began.
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+    weight: FloatArray
+    standardised: FloatArray
+    evidence: FloatArray
+    run: IntArray
+    since: FloatArray
+
+
+def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
+    """State of a filter that has seen nothing; ``most`` hypotheses are kept."""
+    d, m = motion.axes, motion.order + 1
+    return Bank(
+        np.full(1, np.nan),
+        np.ones(1, np.int64),
+        np.zeros(most),
+        np.zeros((most, d, m)),
+        np.zeros((most, d, m, m)),
+        np.zeros((most, d), np.bool_),
+        np.full(most, np.nan),
+        np.full(most, -1, np.int64),
+        np.full(most, np.nan),
+        np.zeros(most, np.int64),
+        np.zeros(most, np.int64),
+        np.full(1, np.nan),
+    )

@@ -1,0 +1,208 @@
+"""Kernels that weigh the accounts which each hypothesis can give of an observation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from surefix.filters.hypotheses import COMMIT, CONTINUE, DROP, OPEN, VELOCITY_OUT, Bank, Prior
+from surefix.filters.records import Motion
+from surefix.jit import helper
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["BRANCHES", "CONFIRMED", "log_wild", "position_branches", "velocity_branches", "wrapped"]
+
+BRANCHES = 12
+"""Candidates that a hypothesis can have at one epoch, at most."""
+CONFIRMED = 3
+"""Fixes of a run before it can be called a jump."""
+_PREFERS = 3.0  # nats by which another sensor must prefer the offset to confirm a jump
+_PI = math.pi
+_LOG_2PI = math.log(2.0 * math.pi)
+
+
+@helper
+def log_wild(square: float, log_scale: float, count: int) -> float:
+    """Log-density of a gross error: Cauchy in ``count`` dimensions, so that no size is impossible.
+
+    Parameters
+    ----------
+    square
+        Sum of squares of the errors over their scales.
+    log_scale
+        Sum of the logarithms of the scales.
+    """
+    if count == 1:
+        constant = -math.log(_PI)
+    elif count == 2:
+        constant = -math.log(2.0 * _PI)
+    else:
+        constant = -2.0 * math.log(_PI)
+    return constant - log_scale - 0.5 * (count + 1) * math.log1p(square)
+
+
+@helper
+def wrapped(nu: float, period: float) -> float:
+    """Innovation of an angle, within half a turn; unchanged if ``period`` is 0."""
+    return nu - period * np.rint(nu / period) if period > 0.0 else nu
+
+
+@helper
+def velocity_branches(
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    z: FloatArray,
+    variance: FloatArray,
+    forced: FloatArray,
+    sensor: int,
+    score: FloatArray,
+    parent: IntArray,
+    code: IntArray,
+) -> int:
+    """Candidates of an observed velocity: it belongs to the track, or not."""
+    d, total = motion.axes, 0
+    for k in range(bank.number[0]):
+        inside = 0.0
+        square = 0.0
+        scale = 0.0
+        seen = 0
+        for a in range(d):
+            c = d + a
+            if math.isnan(z[c]):
+                continue
+            nu = z[c] - bank.mean[k, a, 1]
+            S = bank.covariance[k, a, 1, 1] + variance[c]
+            inside -= 0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+            wide = prior.spread[c] * prior.spread[c] + S
+            square += nu * nu / wide
+            scale += 0.5 * math.log(wide)
+            seen += 1
+        out = prior.again if (bank.faulty[k] >> sensor) & 1 else prior.velocity
+        outside = log_wild(square, scale, seen)
+        if forced[d] != 0.0:
+            score[total] = bank.weight[k] + inside + math.log1p(-out)
+            parent[total], code[total] = k, 0
+            total += 1
+        if not forced[d] > 0.0:
+            score[total] = bank.weight[k] + outside + math.log(out)
+            parent[total], code[total] = k, VELOCITY_OUT
+            total += 1
+    return total
+
+
+@helper
+def position_branches(
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    z: FloatArray,
+    variance: FloatArray,
+    forced: FloatArray,
+    sensor: int,
+    score: FloatArray,
+    parent: IntArray,
+    code: IntArray,
+) -> int:
+    """Candidates of an observed position."""
+    d, n = motion.axes, motion.order + 1
+    b = n - 1
+    inside = np.empty(3)
+    wild = np.empty(3)
+    wide = np.empty(3)
+    total = 0
+    observed = 0
+    mask = 0
+    for a in range(d):
+        if not math.isnan(z[a]):
+            observed += 1
+            mask |= 1 << a
+    given = 0  # what is decided beforehand
+    decided = False
+    for a in range(d):
+        if not math.isnan(z[a]) and not math.isnan(forced[a]):
+            decided = True
+            given |= (1 << a) if forced[a] == 0.0 else 0
+    for k in range(bank.number[0]):
+        belongs = 0.0
+        square = 0.0
+        scale = 0.0
+        offset = 0.0
+        unknown = False
+        for a in range(d):
+            if math.isnan(z[a]):
+                continue
+            s2 = prior.spread[a] * prior.spread[a]
+            if not bank.seen[k, a]:
+                inside[a] = -math.log(2.0 * _PI * prior.spread[a])
+                wild[a], wide[a] = 1.0, s2
+                unknown = True
+            else:
+                nu = wrapped(z[a] - bank.mean[k, a, 0], motion.period)
+                S = bank.covariance[k, a, 0, 0] + variance[a]
+                inside[a] = -0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+                wide[a] = s2 + S
+                wild[a] = nu * nu / wide[a]
+                if bank.run[k] >= 0:
+                    S += 2.0 * bank.covariance[k, a, 0, b] + bank.covariance[k, a, b, b]
+                    nu = wrapped(nu - bank.mean[k, a, b], motion.period)
+                    offset -= 0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+            belongs += inside[a]
+            square += wild[a]
+            scale += 0.5 * math.log(wide[a])
+        outside = log_wild(square, scale, observed)
+        base = bank.weight[k]
+        own = bank.run[k] == sensor
+        if decided:
+            score[total] = base
+            for a in range(d):
+                if (given >> a) & 1:
+                    score[total] += log_wild(wild[a], 0.5 * math.log(wide[a]), 1)
+                elif not math.isnan(z[a]):
+                    score[total] += inside[a]
+            parent[total], code[total] = k, given
+            total += 1
+            continue
+        staying = 1.0 - prior.isolated - prior.partial - prior.burst
+        if own:
+            score[total] = base + belongs + math.log(prior.ending)
+            code[total] = DROP
+        else:
+            score[total] = base + belongs + math.log(staying)
+            code[total] = 0
+        parent[total] = k
+        total += 1
+        score[total] = base + outside + math.log(prior.isolated)
+        parent[total], code[total] = k, mask
+        total += 1
+        if not unknown and (bank.run[k] < 0 or own):
+            score[total] = base + outside + math.log(prior.burst)
+            parent[total], code[total] = k, OPEN
+            total += 1
+        if own and not unknown:
+            staying = 1.0 - prior.isolated - prior.ending
+            score[total] = base + offset + math.log(staying)
+            parent[total], code[total] = k, CONTINUE
+            total += 1
+        confirms = bank.run[k] >= 0 and not own and not unknown and bank.length[k] >= CONFIRMED
+        if confirms and offset - belongs > _PREFERS:
+            score[total] = base + offset + math.log(prior.burst)
+            parent[total], code[total] = k, COMMIT
+            total += 1
+        if observed > 1 and not own:
+            for a in range(d):
+                if math.isnan(z[a]):
+                    continue
+                alone = log_wild(wild[a], 0.5 * math.log(wide[a]), 1)
+                score[total] = base + belongs - inside[a] + alone
+                score[total] += math.log(prior.partial / (observed + 1))
+                parent[total], code[total] = k, 1 << a
+                total += 1
+            if observed == 3:
+                pair = wild[0] + wild[1]
+                both = log_wild(pair, 0.5 * math.log(wide[0] * wide[1]), 2)
+                score[total] = base + inside[2] + both + math.log(prior.partial / (observed + 1))
+                parent[total], code[total] = k, 3
+                total += 1
+    return total

@@ -1,0 +1,171 @@
+"""Judge every observation again by what all the others say of it.
+
+The deleted residual of an observation takes the place of its innovation in the same probabilities
+that the multi-hypothesis filter weighs: it belongs to the track, or it is wrong on some of its
+axes, or on all.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from surefix.filters.hypotheses import Prior
+from surefix.filters.hypothesis_branches import log_wild
+from surefix.filters.records import Epochs, Motion
+from surefix.filters.rts import Smoothed
+from surefix.jit import helper, kernel
+from surefix.types import BoolArray, FloatArray
+
+__all__ = ["deleted_residuals", "review"]
+
+_LOG_2PI = math.log(2.0 * math.pi)
+
+
+def deleted_residuals(
+    motion: Motion, epochs: Epochs, fixed: FloatArray, smoothed: Smoothed
+) -> tuple[FloatArray, FloatArray]:
+    """Residual of each component from what all others say, and its variance; NaN if unobserved.
+
+    ``e = (z − Hx) R/(R − P)``, ``S = R + P R/(R − P)`` for a component that was used, with x and P
+    smoothed; without the factors for one that was not.
+
+    Parameters
+    ----------
+    motion, epochs
+        Model and n observations.
+    fixed
+        (n, m) 1 where the component was used.
+    smoothed
+        Smoothed states of the same epochs.
+
+    Returns
+    -------
+    residual, variance
+        (n, m) each.
+    """
+    m = epochs.z.shape[1]
+    P = np.maximum(np.einsum("kii->ki", smoothed.covariance)[:, :m], 0.0)
+    e = epochs.z - smoothed.mean[:, :m]
+    if motion.period > 0.0:
+        e[:, 0] -= motion.period * np.rint(e[:, 0] / motion.period)
+    R = epochs.variance
+    gain = np.where(fixed > 0.0, R / np.maximum(R - P, 1e-9 * R), 1.0)
+    residual: FloatArray = e * gain
+    spread: FloatArray = np.where(np.isnan(epochs.z), np.nan, R + P * gain)
+    return residual, spread
+
+
+def review(
+    motion: Motion,
+    prior: Prior,
+    epochs: Epochs,
+    fixed: FloatArray,
+    smoothed: Smoothed,
+    locked: BoolArray,
+) -> FloatArray:
+    """Decide anew which components belong to the track.
+
+    Parameters
+    ----------
+    motion, prior, epochs
+        As given to the filter.
+    fixed
+        (n, m) 1 where the component was used; not modified.
+    smoothed
+        What the used ones say.
+    locked
+        (n,) epochs whose fixes stay out: they belong to a run.
+
+    Returns
+    -------
+    fixed
+        (n, m) the new decisions; those that ``epochs`` fixes beforehand stay.
+    """
+    residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
+    out = fixed.copy()
+    _review(motion.axes, prior, residual, variance, locked, out)
+    return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
+
+
+@helper
+def _patterns(
+    axes: int, prior: Prior, inside: FloatArray, wild: FloatArray, wide: FloatArray, seen: int
+) -> int:
+    """Bit mask of the axes that are wrong, under the likeliest account of one fix."""
+    belongs = 0.0
+    square = 0.0
+    scale = 0.0
+    mask = 0
+    for a in range(axes):
+        if not math.isnan(wild[a]):
+            belongs += inside[a]
+            square += wild[a]
+            scale += 0.5 * math.log(wide[a])
+            mask |= 1 << a
+    best = belongs + math.log(1.0 - prior.isolated - prior.partial)
+    chosen = 0
+    score = math.log(prior.isolated) + log_wild(square, scale, seen)
+    if score > best:
+        best, chosen = score, mask
+    if seen > 1:
+        each = math.log(prior.partial / (seen + 1))
+        for a in range(axes):
+            if math.isnan(wild[a]):
+                continue
+            score = each + belongs - inside[a] + log_wild(wild[a], 0.5 * math.log(wide[a]), 1)
+            if score > best:
+                best, chosen = score, 1 << a
+        if seen == 3:
+            pair = log_wild(wild[0] + wild[1], 0.5 * math.log(wide[0] * wide[1]), 2)
+            score = each + inside[2] + pair
+            if score > best:
+                chosen = 3
+    return chosen
+
+
+@kernel
+def _review(
+    axes: int,
+    prior: Prior,
+    residual: FloatArray,
+    variance: FloatArray,
+    locked: BoolArray,
+    out: FloatArray,
+) -> None:
+    inside = np.empty(axes)
+    wild = np.empty(axes)
+    wide = np.empty(axes)
+    for k in range(out.shape[0]):
+        for part in range(2):
+            seen = 0
+            belongs = 0.0
+            square = 0.0
+            scale = 0.0
+            for a in range(axes):
+                c = part * axes + a
+                wild[a] = np.nan
+                e, S = residual[k, c], variance[k, c]
+                if math.isnan(e):
+                    continue
+                seen += 1
+                inside[a] = -0.5 * (e * e / S + math.log(S) + _LOG_2PI)
+                wide[a] = prior.spread[c] * prior.spread[c] + S
+                wild[a] = e * e / wide[a]
+                belongs += inside[a]
+                square += wild[a]
+                scale += 0.5 * math.log(wide[a])
+            if seen == 0:
+                continue
+            if part == 1:
+                outside = log_wild(square, scale, seen) + math.log(prior.velocity)
+                good = belongs + math.log1p(-prior.velocity) >= outside
+                for a in range(axes):
+                    out[k, axes + a] = 1.0 if good else 0.0
+                continue
+            if locked[k]:
+                continue
+            mask = _patterns(axes, prior, inside, wild, wide, seen)
+            for a in range(axes):
+                out[k, a] = 0.0 if (mask >> a) & 1 else 1.0

@@ -1,0 +1,141 @@
+"""From the trail of hypotheses back to decisions: what was used, and where the track jumped."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.filters.hypotheses import COMMIT, CONTINUE, OPEN, VELOCITY_OUT, Trail
+from surefix.filters.records import Motion
+from surefix.jit import helper, kernel
+from surefix.types import FloatArray, IntArray
+
+__all__ = ["Decisions", "decide", "follow", "run_lengths", "undecided"]
+
+
+class Decisions(NamedTuple):
+    """What one account of the past says of each of n epochs.
+
+    Parameters
+    ----------
+    fixed
+        (n, 2·axes) 1 where the component belongs to the track, 0 where it does not.
+    jump
+        (n,) bit mask of the axes whose position jumps before this epoch.
+    run
+        (n,) 1 where the fix belongs to a run with a common offset.
+    """
+
+    fixed: FloatArray
+    jump: IntArray
+    run: IntArray
+
+
+def undecided(motion: Motion, n: int) -> Decisions:
+    """Make an empty record."""
+    return Decisions(np.ones((n, 2 * motion.axes)), np.zeros(n, np.int64), np.zeros(n, np.int64))
+
+
+@helper
+def _write(decisions: Decisions, k: int, code: int, axes: int, running: bool) -> None:
+    for a in range(axes):
+        out = running or (code >> a) & 1
+        decisions.fixed[k, a] = 0.0 if out else 1.0
+        decisions.fixed[k, axes + a] = 0.0 if code & VELOCITY_OUT else 1.0
+
+
+@kernel
+def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decisions) -> int:
+    """Write what the likeliest hypothesis of epoch ``head`` says of the epochs from ``first`` on.
+
+    A jump that is dated back further than ``first`` is put there.
+
+    Returns
+    -------
+    changed
+        The first epoch of which it says something else than ``decisions`` did, or ``head``.
+    """
+    slot = trail.best[head]
+    committed = False
+    changed = head
+    every = (1 << motion.axes) - 1
+    for k in range(head, first - 1, -1):
+        code = trail.code[k, slot]
+        if code & COMMIT:
+            committed = True
+        running = code & (OPEN | CONTINUE) != 0
+        jump = every if committed and (code & OPEN != 0 or k == first) else 0
+        inside = running and not committed
+        same = decisions.jump[k] == jump
+        for a in range(motion.axes):
+            used = 0.0 if inside or (code >> a) & 1 else 1.0
+            moved = 0.0 if code & VELOCITY_OUT else 1.0
+            same = same and decisions.fixed[k, a] == used
+            same = same and decisions.fixed[k, motion.axes + a] == moved
+        if not same:
+            changed = k
+        _write(decisions, k, code, motion.axes, inside)
+        decisions.jump[k] = jump
+        decisions.run[k] = 1 if inside else 0
+        if code & OPEN:
+            committed = False
+        slot = trail.parent[k, slot]
+    return changed
+
+
+@kernel
+def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisions) -> int:
+    """Write decisions from ``head`` on as long as the likeliest hypothesis descends from ``slot``.
+
+    Returns
+    -------
+    until
+        The first epoch at which the past is seen otherwise, or the end.
+    """
+    n = len(trail.best)
+    for k in range(head, n):
+        best = trail.best[k]
+        code = trail.code[k, best]
+        if k > 0 and (trail.parent[k, best] != slot or code & COMMIT):
+            return k
+        running = code & (OPEN | CONTINUE) != 0
+        _write(decisions, k, code, motion.axes, running)
+        decisions.jump[k] = 0
+        decisions.run[k] = 1 if running else 0
+        slot = best
+    return n
+
+
+@kernel
+def run_lengths(run: IntArray, used: FloatArray) -> IntArray:
+    """Fixes of the run that each fix belongs to, 0 where to none.
+
+    Parameters
+    ----------
+    run
+        (n,) 1 where the fix belongs to a run.
+    used
+        (n, m) 1 where a component of the position was used, 0 where not, NaN where not observed;
+        a fix that was used ends a run.
+    """
+    n = run.shape[0]
+    length = np.zeros(n, np.int64)
+    first = last = -1
+    count = 0
+    for k in range(n + 1):
+        ends = k == n
+        if k < n and not run[k]:
+            for c in range(used.shape[1]):
+                ends = ends or used[k, c] > 0.0
+        if ends and count > 0:
+            for j in range(first, last + 1):
+                if run[j]:
+                    length[j] = count
+            count = 0
+        elif k < n and run[k]:
+            if count == 0:
+                first = k
+            last = k
+            count += 1
+    return length

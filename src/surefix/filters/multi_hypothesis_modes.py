@@ -1,0 +1,193 @@
+"""The three modes of the multi-hypothesis filter: real time, fixed lag, offline.
+
+Real time gives the mixture of all hypotheses. With a lag each epoch follows the account of the past
+that is likeliest when its window ends, and is smoothed over the window. Offline the filter runs
+forward and backward; what either doubts is left out at first and comes back if all others agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surefix.filters.hypotheses import Bank, Prior, no_hypotheses
+from surefix.filters.hypothesis_review import deleted_residuals, review
+from surefix.filters.hypothesis_trail import (
+    Decisions,
+    decide,
+    follow,
+    run_lengths,
+    undecided,
+)
+from surefix.filters.modes import (
+    from_filtered,
+    from_smoothed,
+    rows_of,
+    smoothed_stretch,
+    state_before,
+    write_rows,
+)
+from surefix.filters.multi_hypothesis import filter_hypotheses
+from surefix.filters.offline import backward, needed_jumps
+from surefix.filters.records import Epochs, Estimate, Filtered, Motion, Recovery, TrackState
+from surefix.filters.rts import smooth
+from surefix.filters.track import blank, filter_track, start
+from surefix.robust.loss import loss_named
+from surefix.types import BoolArray, FloatArray, IntArray
+
+__all__ = ["lagged_hypotheses", "offline_hypotheses", "realtime_hypotheses"]
+
+_SWEEPS = 6
+
+
+def realtime_hypotheses(
+    motion: Motion, prior: Prior, epochs: Epochs, bank: Bank
+) -> tuple[Bank, Estimate]:
+    """Estimate every epoch from the past and itself alone; takes and gives the hypotheses."""
+    after, found, _ = filter_hypotheses(motion, prior, epochs, bank, traced=False)
+    known = np.isfinite(found.weight)
+    standardised = np.where(known, found.standardised, np.nan)
+    since = np.full((len(epochs.time), motion.groups), np.nan)
+    since[:, : motion.axes] = found.since[:, None]
+    jump = np.where(np.isfinite(found.since), (1 << motion.axes) - 1, 0)
+    return after, Estimate(
+        found.mean,
+        np.where(np.isnan(found.sigma), np.inf, found.sigma),
+        found.weight,
+        np.abs(standardised),
+        standardised,
+        jump,
+        since,
+        found.run,
+    )
+
+
+def lagged_hypotheses(
+    motion: Motion, prior: Prior, epochs: Epochs, lag: float, wanted: BoolArray
+) -> Estimate:
+    """Estimate every epoch from the past and the ``lag`` seconds that follow it.
+
+    Parameters
+    ----------
+    motion, prior, epochs
+        As for the filter.
+    lag
+        Seconds ≥ 0.
+    wanted
+        (n,) epochs that are smoothed; the others keep the filter's estimate.
+    """
+    time, n = epochs.time, len(epochs.time)
+    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
+    last = np.searchsorted(time, time + lag, side="right") - 1
+    recovery, kept, said = _steady(prior), blank(motion, n), undecided(motion, n)
+    state, parts = start(motion, recovery), []
+    head, done = 0, 0
+    while head < n:
+        slot = int(trail.best[head - 1]) if head else 0
+        until = follow(motion, trail, head, slot, said)
+        state, out, count = _filter(motion, recovery, epochs, said, head, until, state)
+        write_rows(kept, head, out, count)
+        if until == n:
+            break
+        ready = max(int(np.searchsorted(last, until)), done)
+        parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, ready))
+        done = ready
+        first = min(decide(motion, trail, until, done, said), until)
+        before = state_before(motion, recovery, time, kept, first, state)
+        state, out, count = _filter(motion, recovery, epochs, said, first, until + 1, before)
+        write_rows(kept, first, out, count)
+        head = until + 1
+    parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, n))
+    whole = Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+    return _named(motion, epochs, said, whole)
+
+
+def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate:
+    """Estimate every epoch from the whole series.
+
+    Parameters
+    ----------
+    motion, prior, epochs
+        As for the filter; weights that ``epochs`` fixes beforehand stay.
+
+    Returns
+    -------
+    Estimate
+        ``distance`` and ``standardised`` are deleted residuals; ``since`` marks the jumps.
+    """
+    recovery, n = _steady(prior), len(epochs.time)
+    if not n:
+        return from_filtered(blank(motion, 0))
+    ahead = _decided(motion, prior, epochs)
+    back = _decided(motion, prior, backward(motion, epochs))
+    said = Decisions(
+        np.minimum(ahead.fixed, back.fixed[::-1]),
+        _in_both(epochs.time, ahead.jump, back.jump[::-1], prior.longest),
+        ahead.run & back.run[::-1],
+    )
+    locked = said.run > 0
+    for _ in range(_SWEEPS):
+        _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
+        smoothed = smooth(motion, recovery, epochs.time, filtered)
+        jump = needed_jumps(motion, epochs, said.jump, smoothed)
+        fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
+        if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
+            break
+        said = Decisions(fixed, jump, said.run)
+    residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+    standardised = residual / np.sqrt(variance)
+    whole = from_smoothed(smoothed, from_filtered(filtered))
+    whole = whole._replace(standardised=standardised, distance=np.abs(standardised))
+    return _named(motion, epochs, said, whole)
+
+
+def _steady(prior: Prior) -> Recovery:
+    """The filter that follows decisions: it never recovers by itself."""
+    return Recovery(np.inf, prior.sigma_velocity, keeps_rate=True)
+
+
+def _filter(
+    motion: Motion,
+    recovery: Recovery,
+    epochs: Epochs,
+    said: Decisions,
+    first: int,
+    until: int,
+    state: TrackState,
+) -> tuple[TrackState, Filtered, int]:
+    """Filter the epochs ``first`` … ``until`` − 1 as decided."""
+    decided = epochs._replace(fixed=said.fixed, jump=said.jump)
+    return filter_track(
+        motion, loss_named("kalman"), recovery, rows_of(decided, first, until), state
+    )
+
+
+def _decided(motion: Motion, prior: Prior, epochs: Epochs) -> Decisions:
+    """What the likeliest hypothesis at the end of the series says of all of it."""
+    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
+    said = undecided(motion, len(epochs.time))
+    decide(motion, trail, len(epochs.time) - 1, 0, said)
+    return said
+
+
+def _in_both(time: FloatArray, ahead: IntArray, back: IntArray, apart: float) -> IntArray:
+    """Jumps that both directions see, where the forward one dates them.
+
+    One that only one direction sees belongs to a run at an end of the log, which is too short to be
+    believed against the rest.
+    """
+    known = time[np.minimum(np.flatnonzero(back) + 1, len(time) - 1)]
+    jump = np.zeros_like(ahead)
+    for k in np.flatnonzero(ahead):
+        if len(known) and np.abs(known - time[k]).min() <= apart:
+            jump[k] = ahead[k]
+    return jump
+
+
+def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> Estimate:
+    """Add when jumps happened, and how long the runs were."""
+    seen = np.isfinite(epochs.z[:, : motion.axes])
+    used = np.where(seen, said.fixed[:, : motion.axes], np.nan)
+    bits = ((said.jump[:, None] >> np.arange(motion.groups)) & 1).astype(np.bool_)
+    since: FloatArray = np.where(bits, epochs.time[:, None], np.nan)
+    length = run_lengths(np.where(seen.any(axis=1), said.run, 0), used)
+    return whole._replace(jump=said.jump, since=since, run=length)
