@@ -7,14 +7,14 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.exceptions import TyperException
 
+from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def clean(
         _check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
     _keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
-    with _progress(files, quiet=as_json) as told:
+    with over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
             depth=depth,
@@ -199,7 +199,7 @@ def info(
     from surefix.pipelines.info import describe, info_lines
 
     files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
-    with _progress(files, quiet=as_json) as told:
+    with over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
             depth=depth,
@@ -242,6 +242,10 @@ def reproduce(
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(help="With ship: a recorded log instead of simulated ones; repeatable."),
+    ] = None,
 ) -> None:
     """Run a paper's experiment again: its methods, its baselines, and the printed figures."""
     from surefix.papers.reproduce import reproduce as run
@@ -249,8 +253,9 @@ def reproduce(
 
     if report is not None:
         _check_report(report)
-    with _repetitions(runs) as told:
-        experiment = run(paper, seed=seed, runs=runs, progress=told)
+    _keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
+    with over_runs(runs) as told:
+        experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)
     for line in text_lines(experiment):
         typer.echo(line)
     if json_file is not None:
@@ -346,42 +351,6 @@ def _check_report(path: Path) -> None:
     check_extra()
     if path.suffix.lower() not in (".html", ".htm"):
         raise OptionsError(f"--report {path}", "a name that ends in .html")
-
-
-@contextmanager
-def _progress(files: list[Path], *, quiet: bool) -> Iterator[Callable[[int], None] | None]:
-    """Show a bar over the bytes of the inputs, on a terminal only."""
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
-
-    size = sum(path.stat().st_size for path in files if path.is_file())
-    with Progress(
-        TextColumn("reading and cleaning"),
-        BarColumn(),
-        DownloadColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
-        task = bar.add_task("", total=size)
-        yield lambda done: bar.update(task, completed=done)
-
-
-@contextmanager
-def _repetitions(runs: int) -> Iterator[Callable[[int], None] | None]:
-    """Show a bar over the repetitions, on a terminal only."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("runs", total=runs)
-        yield lambda done: bar.update(task, completed=done)
 
 
 def _print(found: dict[str, Any], text: list[str], as_json: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,12 @@ PAPERS = ("usbl", "cooperative", "towed", "ship", "radar")
 
 
 def reproduce(
-    paper: str, *, seed: int = 1, runs: int = 20, progress: Progress | None = None
+    paper: str,
+    *,
+    seed: int = 1,
+    runs: int = 20,
+    logs: Sequence[str | Path] = (),
+    progress: Progress | None = None,
 ) -> Experiment:
     """Run a paper's experiment with its methods, its baselines and ours.
 
@@ -30,18 +36,24 @@ def reproduce(
         What everything is drawn from; the same seed gives the same figures.
     runs
         Number of independent repetitions, at least 1.
+    logs
+        With ``ship``, recorded logs that the methods are run on instead of simulated ones.
     progress
         Told the number of finished runs.
 
     Raises
     ------
     OptionsError
-        No such paper, a negative seed, or no runs.
+        No such paper, a negative seed, no runs, or logs for a paper that takes none.
+    InputError, ParseError
+        A log cannot be read.
     """
     if seed < 0:
         raise OptionsError(f"seed {seed}", "a whole number from 0")
     if runs < 1:
         raise OptionsError(f"runs {runs}", "a whole number from 1")
+    if logs and paper != "ship":
+        raise OptionsError(f"logs for the paper {paper!r}", "no logs, or the paper ship")
     match paper:
         case "usbl":
             from surefix.papers import usbl
@@ -56,8 +68,11 @@ def reproduce(
 
             return cooperative.run(cooperative.CooperativeOptions(seed=seed, runs=runs), progress)
         case "ship":
-            from surefix.papers import ship
+            from surefix.papers import ship, ship_log
 
+            if logs:
+                given = ship_log.ShipLogOptions(paths=tuple(logs), seed=seed, runs=runs)
+                return ship_log.run_logs(given, progress)
             return ship.run(ship.ShipPaperOptions(seed=seed, runs=runs), progress)
         case _:
             raise OptionsError(f"paper {paper!r}", f"one of {', '.join(PAPERS)}")

@@ -31,12 +31,14 @@ def thinned(
 
 
 def figures(
-    log: ShipLog, record: Integrated, removed: Mapping[str, list[float]]
+    alone: ShipLog, log: ShipLog, record: Integrated, removed: Mapping[str, list[float]]
 ) -> tuple[Figure, ...]:
     """Draw one voyage.
 
     Parameters
     ----------
+    alone
+        The voyage with isolated gross errors only, as the paper's pictures show it.
     log
         The voyage.
     record
@@ -45,14 +47,17 @@ def figures(
         By method, share of the gross errors that it removed, by length of the burst, percent.
     """
     return (
-        _logged(log, "ins-position", "Position of the INS (Figure 2 of the paper)",
+        _logged(alone, "ins-position", "Position of the INS (Figure 2 of the paper)",
                 {"longitude": "longitude, °", "latitude": "latitude, °"}, _DEGREE),
-        _logged(log, "ins-velocity", "Velocity of the INS (Figure 3 of the paper)",
+        _logged(alone, "ins-velocity", "Velocity of the INS (Figure 3 of the paper)",
                 {"v_east": "east velocity, m/s", "v_north": "north velocity, m/s"}, 1.0),
-        _logged(log, "ins-attitude", "Attitude of the INS (Figure 4 of the paper)",
+        _logged(alone, "ins-attitude", "Attitude of the INS (Figure 4 of the paper)",
                 {"roll": "roll, °", "pitch": "pitch, °", "heading": "heading, °"}, _DEGREE),
-        _filtered(log, "v_east", "east-velocity", "East velocity, three methods (Figure 5)"),
-        _filtered(log, "v_north", "north-velocity", "North velocity, three methods (Figure 6)"),
+        _filtered(alone, "v_east", "east-velocity",
+                  "East velocity, isolated errors (Figure 5 of the paper)"),
+        _filtered(alone, "v_north", "north-velocity",
+                  "North velocity, isolated errors (Figure 6 of the paper)"),
+        _filtered(log, "v_east", "east-velocity-bursts", "East velocity, with bursts", OURS),
         _bursts(removed),
         _record(log, record),
     )  # fmt: skip
@@ -66,12 +71,13 @@ def _logged(log: ShipLog, key: str, title: str, shown: Mapping[str, str], unit: 
     panels = []
     for quantity, label in shown.items():
         sensor = log.sensor("INS", quantity)
-        trace = thinned("INS, as logged", _hours(log), unit * sensor.value)
+        kind = "raw" if quantity == "heading" else "line"  # a line would cross the seam at north
+        trace = thinned("INS, as logged", _hours(log), unit * sensor.value, kind)
         panels.append(Panel(x_label="time, h", y_label=label, traces=(trace,)))
     return Figure(key=key, title=title, panels=tuple(panels), columns=2 if len(panels) == 2 else 1)
 
 
-def _filtered(log: ShipLog, quantity: str, key: str, title: str) -> Figure:
+def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> Figure:
     """Raw and filtered, for each method the whole voyage and a stretch with faults of all kinds."""
     sensor, hours = log.sensor("INS", quantity), _hours(log)
     given = series(log, sensor)
@@ -80,7 +86,7 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str) -> Figure:
     label = f"{'east' if quantity == 'v_east' else 'north'} velocity, m/s"
     low, high = np.nanmin(sensor.intact[near]), np.nanmax(sensor.intact[near])
     panels = []
-    for name in (*FIGURES_SHOW, OURS):
+    for name in (*FIGURES_SHOW, *more):
         cleaned = METHODS[name](given).value
         panels += [
             Panel(
@@ -103,11 +109,15 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str) -> Figure:
 
 
 def _stretch(burst: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[int, int]:
-    """Rows of about five minutes with as many different lengths of bursts as can be."""
+    """Rows of about five minutes with as many bursts as can be, of different lengths."""
     n, width = len(burst), min(320, len(burst))
     starts = np.arange(0, n - width + 1, 20)
-    kinds = [len(set(burst[at : at + width].tolist()) - {0}) for at in starts]
-    at = int(starts[int(np.argmax(kinds))])
+    bursts = np.diff((burst > 0).astype(np.int64), prepend=0) > 0
+    rich = [
+        len(set(burst[at : at + width].tolist())) + 0.1 * bursts[at : at + width].sum()
+        for at in starts
+    ]
+    at = int(starts[int(np.argmax(rich))])
     return at, at + width
 
 

@@ -20,7 +20,17 @@ from surefix.simulate.ship import QUANTITIES, ShipLog, ShipSensor
 from surefix.simulate.ship_faults import BURSTS
 from surefix.types import BoolArray, FloatArray
 
-__all__ = ["CHAIN", "CHANNELS", "FACTORS", "UNITS", "Rows", "chain_rows", "editing_rows", "series"]
+__all__ = [
+    "CHAIN",
+    "CHANNELS",
+    "FACTORS",
+    "UNITS",
+    "Rows",
+    "chain_rows",
+    "editing_rows",
+    "isolated_rows",
+    "series",
+]
 
 Rows = dict[str, dict[str, list[float]]]
 """Table → row → one figure a column."""
@@ -99,6 +109,20 @@ def editing_rows(log: ShipLog) -> Rows:
             for factor, each in sweep.items()
         },
     }
+
+
+def isolated_rows(log: ShipLog) -> dict[str, list[float]]:
+    """RMSE of the INS's two velocities by method: the paper's own comparison."""
+    rows: dict[str, list[float]] = {}
+    for quantity in ("v_east", "v_north"):
+        sensor = log.sensor("INS", quantity)
+        given = series(log, sensor)
+        nothing = np.zeros(len(given.value), np.bool_)
+        logged = Replaced(given.value, given.value, nothing)
+        rows.setdefault("as logged", []).append(_score(sensor, given, logged).error)
+        for name, method in METHODS.items():
+            rows.setdefault(name, []).append(_score(sensor, given, method(given)).error)
+    return rows
 
 
 def _rows(scores: Mapping[str, list[_Scores]], name: str, factor: float) -> dict[str, list[float]]:

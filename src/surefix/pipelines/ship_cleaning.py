@@ -15,9 +15,10 @@ from surefix.geo.angle import wrap
 from surefix.pipelines.ship_options import PERIODS, ShipOptions, thresholds
 from surefix.types import BoolArray, FloatArray, IntArray, Reason, Verdict, Verdicts
 
-__all__ = ["CleanStream", "Stream", "clean_stream"]
+__all__ = ["CleanStream", "Stream", "clean_stream", "resolution"]
 
 _WHITE = 0.6898  # robust scale of x − x₃ over that of x, where x is white normal noise
+_REPEATING = 0.05  # share of repeated values from which digits are coarse
 _HALF_PI = 0.5 * np.pi
 _RANGES = {
     "latitude": (-_HALF_PI, _HALF_PI),
@@ -112,7 +113,7 @@ def clean_stream(stream: Stream, latitude: FloatArray, options: ShipOptions) -> 
     kept = np.where(cleaned.replaced, np.nan, residual)
     samples = max(round(options.evaluation_s / _median_step(time)), 5)
     sigma = rolling_scale(kept, samples) / _WHITE
-    sigma = np.fmax(sigma, grain(stream.value) / np.sqrt(12.0))
+    sigma = np.fmax(sigma, resolution(stream.value) / np.sqrt(12.0))
     sigma = np.where(sigma > 0.0, sigma, np.nan)
     off = _difference(stream.value, cleaned.estimate, period)
     return CleanStream(
@@ -123,6 +124,17 @@ def clean_stream(stream: Stream, latitude: FloatArray, options: ShipOptions) -> 
         cleaned.replaced,
         _verdicts(stream, check, cleaned, off, sigma),
     )
+
+
+def resolution(value: FloatArray) -> float:
+    """Last digit of a series; 0 where its values do not repeat, for then there is none to see.
+
+    >>> resolution(np.array([1.5, 1.5, 1.0, 2.0, 2.5])), resolution(np.array([0.1, 0.6, 1.1, 1.6]))
+    (0.5, 0.0)
+    """
+    known = value[np.isfinite(value)]
+    repeats = np.count_nonzero(np.diff(known) == 0.0)
+    return grain(known) if repeats > _REPEATING * known.size else 0.0
 
 
 def _bounds(stream: Stream, limit: FloatArray, options: ShipOptions) -> Bounds:

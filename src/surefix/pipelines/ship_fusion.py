@@ -28,6 +28,7 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["Aligned", "Fused", "Quality", "align", "fuse"]
 
+_FORGET = 0.02  # per epoch, of how far predictions were off
 _MEDIAN_LOSS = 0.5 * np.pi  # variance of a median over that of a mean, normal noise
 
 
@@ -155,7 +156,7 @@ def fuse(
     z = np.where(known, aligned.value, np.nan)
     gates = gate * gate * (aligned.variance + aligned.agreement[:, None])
     keep = float(np.exp(-step / fade_s))
-    _combine(z, aligned.offset, aligned.variance, gates, period, keep, fade_s / step, *fused)
+    _combine(z, aligned.offset, aligned.variance, gates, gate, period, keep, fade_s / step, *fused)
     total = np.sqrt(fused.sigma**2 + systematic**2)
     value = np.mod(fused.value, period) if period else fused.value
     return Fused(value, total, fused.sources, fused.quality)
@@ -167,6 +168,7 @@ def _combine(
     offset: FloatArray,
     variance: FloatArray,
     gates: FloatArray,
+    gate: float,
     period: float,
     keep: float,
     patience: float,
@@ -179,7 +181,7 @@ def _combine(
     n, s = z.shape
     here, before = np.full(s, np.nan), np.full(s, np.nan)
     voters = np.empty(s + 1)
-    last, rate, carry, used, gap = np.nan, 0.0, 0.0, 0, 0.0
+    last, rate, carry, used, gap, missed = np.nan, 0.0, 0.0, 0, 0.0, 0.0
     for k in range(n):
         gap += 1.0
         if gap > patience:
@@ -209,7 +211,7 @@ def _combine(
             off = here[i] - centre
             if np.isnan(off):
                 continue
-            if off * off > gates[k, i]:
+            if off * off > gates[k, i] + (gate * gate * missed if alone else 0.0):
                 dropped += 1
                 continue
             weight += 1.0 / variance[k, i]
@@ -237,7 +239,10 @@ def _combine(
                     moved += step / variance[k, i]
                     shared += 1.0 / variance[k, i]
             carry += (last + moved / shared if shared > 0.0 else expected) - mean
-        elif not np.isnan(last):
+        if not np.isnan(last):  # how far the prediction is off, jumps clipped to 3σ
+            off2 = (mean - expected) ** 2
+            missed += _FORGET * (min(off2, 9.0 * (missed + 1.0 / weight)) - missed)
+        if not np.isnan(last) and not changed:
             rate += 0.1 * ((mean - last) / gap - rate)
             carry *= keep
         y[k] = mean + carry

@@ -16,7 +16,7 @@ import numpy as np
 
 from surefix.errors import OptionsError
 from surefix.geo.local_frame import LocalFrame, rotate
-from surefix.simulate.ship_faults import Faults, disturbed
+from surefix.simulate.ship_faults import BURSTS, Faults, disturbed
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["QUANTITIES", "ShipLog", "ShipSensor", "simulate"]
@@ -110,7 +110,13 @@ class ShipLog:
         return next(s for s in self.sensors if (s.sensor, s.quantity) == (sensor, quantity))
 
 
-def simulate(seed: int | list[int], *, hours: float = 11.0, gross_share: float = 0.013) -> ShipLog:
+def simulate(
+    seed: int | list[int],
+    *,
+    hours: float = 11.0,
+    gross_share: float = 0.013,
+    bursts: tuple[int, ...] = BURSTS,
+) -> ShipLog:
     """Draw one voyage; the same seed and options give the same bits.
 
     Parameters
@@ -121,16 +127,21 @@ def simulate(seed: int | list[int], *, hours: float = 11.0, gross_share: float =
         Duration, at least 0.25.
     gross_share
         Share of gross errors among the samples, 0 … 0.05.
+    bursts
+        Lengths of the runs of gross errors, among `surefix.simulate.ship_faults.BURSTS`; without
+        the others their share of the errors is left out. The rest of the voyage stays the same.
 
     Raises
     ------
     OptionsError
-        A voyage too short, or a share out of range.
+        A voyage too short, a share out of range, or no such length.
     """
     if not hours >= 0.25:
         raise OptionsError(f"hours {hours}", "at least 0.25")
     if not 0.0 <= gross_share <= 0.05:
         raise OptionsError(f"gross_share {gross_share}", "0 … 0.05")
+    if not set(bursts) <= set(BURSTS):
+        raise OptionsError(f"bursts {bursts}", f"lengths among {BURSTS}")
     motion, noise, faults = np.random.default_rng(seed).spawn(3)
     t = np.arange(round(hours * 3600.0), dtype=np.float64)
     true, place = _truth(motion, t)
@@ -141,7 +152,9 @@ def simulate(seed: int | list[int], *, hours: float = 11.0, gross_share: float =
         measured = _measured(noise, sensor, t, true, place)
         for quantity in quantities:
             gone = (_START + t >= outage[0]) & (_START + t < outage[1]) & (sensor == "GNSS")
-            wrong = disturbed(faults, measured[quantity], _GROSS[quantity], gross_share, gone)
+            wrong = disturbed(
+                faults, measured[quantity], _GROSS[quantity], gross_share, gone, bursts
+            )
             period = 2.0 * np.pi if quantity in ("heading", "longitude") else 0.0
             turn = period if quantity == "heading" else 0.0
             sensors.append(

@@ -20,7 +20,7 @@ BURSTS = (1, 2, 3, 5, 10, 30)
 """Lengths of the runs of gross errors, in samples."""
 
 _SLOT = 80  # samples that one fault and the quiet after it take
-_SHARE = (0.24, 0.1, 0.13, 0.16, 0.17, 0.2)  # of the gross samples in runs of each length
+_SHARE = {1: 0.24, 2: 0.1, 3: 0.13, 5: 0.16, 10: 0.17, 30: 0.2}  # of the gross samples, by run
 _STUCK, _INVALID, _LOST = 60, 20, 40  # samples
 
 
@@ -60,6 +60,7 @@ def disturbed(
     gross: tuple[float, float],
     share: float,
     gone: BoolArray,
+    lengths: tuple[int, ...] = BURSTS,
 ) -> Disturbed:
     """Put faults into a series.
 
@@ -73,13 +74,14 @@ def disturbed(
         Of gross errors among the samples; 0 leaves the series without any fault but ``gone``.
     gone
         (n,) samples that are missing anyway.
+    lengths
+        Runs that occur, among `BURSTS`; the others and their share are left out.
     """
     n = len(intact)
     burst = np.zeros(n, np.int64)
     stuck, invalid, lost = (np.zeros(n, np.bool_) for _ in range(3))
     value = intact.copy()
-    lengths = _runs(n, share)
-    kinds = [*lengths, *((-1, -2, -3) if share > 0.0 else ())]
+    kinds = [*_runs(n, share, lengths), *((-1, -2, -3) if share > 0.0 else ())]
     slots = rng.permutation(max(n // _SLOT - 1, 0))[: len(kinds)]
     for slot, kind in zip(slots.tolist(), kinds, strict=False):
         at = _SLOT * slot + int(rng.integers(8, 12))
@@ -102,10 +104,9 @@ def disturbed(
     return Disturbed(value, ~invalid, Faults(burst, stuck & ~lost, lost, invalid & ~lost))
 
 
-def _runs(n: int, share: float) -> list[int]:
+def _runs(n: int, share: float, lengths: tuple[int, ...]) -> list[int]:
     """Lengths of the runs of a series; with any share at least one of each length if they fit."""
-    counts = [
-        max(round(share * n * part / length), 1) if share > 0.0 else 0
-        for length, part in zip(BURSTS, _SHARE, strict=True)
-    ]
-    return [length for length, count in zip(BURSTS, counts, strict=True) for _ in range(count)]
+    if share <= 0.0:
+        return []
+    counts = {length: max(round(share * n * _SHARE[length] / length), 1) for length in lengths}
+    return [length for length, count in counts.items() for _ in range(count)]
