@@ -1,0 +1,82 @@
+"""Options of `surefix compare`: one frozen record, validated once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+from surefix.errors import OptionsError
+from surefix.pipelines.options import CleanOptions, Mode
+from surefix.simulate.contamination import SCENARIOS, World
+
+__all__ = ["MODES", "CompareOptions"]
+
+MODES: tuple[Mode, ...] = ("offline", "lagged", "realtime")
+"""The modes in the order of the tables."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """What is compared, on what.
+
+    Parameters
+    ----------
+    methods
+        Names of `surefix.pipelines.options.CleanOptions.method`.
+    scenarios
+        Names of `surefix.simulate.contamination.SCENARIOS`.
+    modes
+        Of ``MODES``.
+    seed
+        Everything is drawn from it; run i draws from ``[seed, i]``.
+    runs
+        Independent repetitions, at least 1. Each draws its own world, unless there is one for all.
+    epochs
+        Fixes of a log, at least 200.
+    world
+        Vehicle and sensors for all runs; None draws noise, rate and agility anew in each.
+    jobs
+        Processes that share the work, at least 1; the figures do not depend on it.
+
+    Raises
+    ------
+    OptionsError
+        A name nobody knows, twice the same, or a figure that is too small.
+    """
+
+    methods: tuple[str, ...] = ("kalman", "igg3", "huber", "student-t")
+    scenarios: tuple[str, ...] = tuple(SCENARIOS)
+    modes: tuple[Mode, ...] = MODES
+    seed: int = 1
+    runs: int = 5
+    epochs: int = 2400
+    world: World | None = None
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        _distinct("methods", self.methods)
+        for method in self.methods:
+            CleanOptions(method=method)
+        _known("scenario", self.scenarios, tuple(SCENARIOS))
+        _known("mode", self.modes, get_args(Mode))
+        for name, least in (("seed", 0), ("runs", 1), ("epochs", 200), ("jobs", 1)):
+            if getattr(self, name) < least:
+                raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {least}")
+
+    @property
+    def trials(self) -> int:
+        """How many logs are drawn: what `compare` tells its progress in."""
+        return self.runs * len(self.scenarios)
+
+
+def _known(what: str, given: Sequence[str], known: Sequence[str]) -> None:
+    _distinct(f"{what}s", given)
+    for name in given:
+        if name not in known:
+            raise OptionsError(f"{what} {name!r}", "one of " + ", ".join(known))
+
+
+def _distinct(what: str, names: Sequence[str]) -> None:
+    if not names or len(set(names)) < len(names):
+        raise OptionsError(f"{what} {', '.join(names)!r}", "at least one name, each once")

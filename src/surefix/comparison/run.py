@@ -1,0 +1,134 @@
+"""Methods × scenarios × modes over seeds, each through the product itself, against the oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import NamedTuple
+
+from surefix.comparison.merit import Merit, merit
+from surefix.comparison.options import CompareOptions
+from surefix.comparison.oracle import lag_of, oracle
+from surefix.comparison.tables import tables
+from surefix.experiment import Experiment, Progress
+from surefix.pipelines.clean import clean_sources
+from surefix.pipelines.inputs import open_inputs
+from surefix.pipelines.options import CleanOptions, Mode
+from surefix.simulate.contamination import Trial, World, alone, columns, draw, draw_world
+from surefix.types import Cleaned
+
+__all__ = ["clean_trial", "compare", "merits"]
+
+
+class _Task(NamedTuple):
+    """One log to be drawn, and cleaned by every method in every mode."""
+
+    scenario: str
+    world: World
+    seed: tuple[int, int]
+    methods: tuple[str, ...]
+    modes: tuple[Mode, ...]
+
+
+def compare(options: CompareOptions, progress: Progress | None = None) -> Experiment:
+    """Run methods on scenarios in modes, with and without velocities.
+
+    Parameters
+    ----------
+    options
+        What is compared, on what.
+    progress
+        Told the number of finished trials, of ``options.trials``.
+    """
+    found = []
+    for done, each in enumerate(_done(_tasks(options), options.jobs), start=1):
+        found.append(each)
+        if progress is not None:
+            progress(done)
+    size = len(options.scenarios)
+    runs = [
+        dict(zip(options.scenarios, found[i : i + size], strict=True))
+        for i in range(0, len(found), size)
+    ]
+    return Experiment(
+        paper="compare",
+        title="Methods against an oracle that knows every fault",
+        source="simulated logs, each run with its own noise, rate and agility"
+        if options.world is None
+        else "simulated logs of one vehicle",
+        seed=options.seed,
+        runs=options.runs,
+        tables=tables(options, runs),
+        figures=(),
+    )
+
+
+def merits(
+    trial: Trial, methods: Sequence[str], modes: Sequence[Mode]
+) -> dict[tuple[Mode, str], Merit]:
+    """Clean one trial by several methods in several modes.
+
+    Parameters
+    ----------
+    trial
+        From `surefix.simulate.contamination.draw`, with or without velocities.
+    methods, modes
+        As in `CompareOptions`.
+    """
+    found = {}
+    for mode in modes:
+        best = oracle(trial, mode)
+        for method in methods:
+            found[mode, method] = merit(trial, clean_trial(trial, method, mode), best, mode)
+    return found
+
+
+def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
+    """Clean the log of a trial as ``surefix clean`` would; only the lag is given.
+
+    Parameters
+    ----------
+    trial
+        What is to be cleaned. Its scenario may want a wrong noise to be given.
+    method, mode
+        Of `surefix.pipelines.options.CleanOptions`.
+    """
+    told = trial.scenario.misjudged * trial.world.sigma_m
+    wrong = told if trial.scenario.misjudged != 1.0 else None
+    options = CleanOptions(
+        mode=mode,
+        method=method,
+        lag_s=lag_of(trial) if mode == "lagged" else None,
+        sigma_position=wrong,
+        sigma_height=wrong,
+    )
+    return clean_sources(open_inputs([columns(trial)]), options)
+
+
+def _tasks(options: CompareOptions) -> Iterator[_Task]:
+    for i in range(options.runs):
+        seed = (options.seed, i)
+        world = options.world or draw_world(seed, epochs=options.epochs)
+        for scenario in options.scenarios:
+            yield _Task(scenario, world, seed, options.methods, options.modes)
+
+
+def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[dict[tuple[bool, Mode, str], Merit]]:
+    """Results in the order of the tasks."""
+    if jobs == 1:
+        yield from map(_run, tasks)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(_run, tasks)
+
+
+def _run(task: _Task) -> dict[tuple[bool, Mode, str], Merit]:
+    """Figures by whether velocities were there, mode and method."""
+    trial = draw(task.scenario, task.world, task.seed)
+    aided = merits(trial, task.methods, task.modes)
+    unaided = {}
+    if not trial.scenario.velocity_runs:  # whose faults are those of the velocities
+        unaided = merits(alone(trial), task.methods, task.modes)
+    return {(True, *key): value for key, value in aided.items()} | {
+        (False, *key): value for key, value in unaided.items()
+    }
