@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from surefix.experiment import Figure, Panel, Table, Trace
-from surefix.papers.cooperative_rows import AXES, Shown
+from surefix.papers.cooperative_rows import AXES, GROSS, Shown
 from surefix.papers.cooperative_tracks import CENTRAL, GAIN, Sailed, observed_positions
 from surefix.types import FloatArray
 
@@ -30,21 +30,16 @@ def figures(shown: Shown, tables: Mapping[str, Table]) -> tuple[Figure, ...]:
         By key; the means over all runs are drawn.
     """
     one, two = shown.sailed["1 path"], shown.sailed["2 path"]
-    raised = next(name for name in shown.sailed if name.startswith("1 path Q"))
     return (
         _single_master(one),
         _all_masters(one),
         _three_planes(one),
-        _cumulative("fig-10", "Cumulative mean error, case 1 (Figure 10)", one),
         _accuracy(one),
-        _cumulative(
-            "fig-12", f"Cumulative mean error, {raised[7:]} (Figure 12)", shown.sailed[raised]
-        ),
         _formation(two),
         _coordinates(two),
-        _cumulative("fig-15", "Cumulative mean error, case 2 (Figure 15)", two),
-        _axes(tables["axes"]),
-        _late(shown.late),
+        _cumulative(shown.sailed),
+        _limits(tables["axes"], tables["gross_m"]),
+        _late(shown.late, tables["late_ratio"]),
     )
 
 
@@ -102,14 +97,23 @@ def _error(sailed: Sailed, fusion: str) -> FloatArray:
     return np.asarray(np.sqrt(np.square(off).sum(axis=-1)))
 
 
-def _cumulative(key: str, title: str, sailed: Sailed) -> Figure:
-    iteration = _iterations(sailed)
-    errors = _errors(sailed) | {name: _error(sailed, name) for name in (GAIN, CENTRAL)}
-    traces = tuple(
-        Trace(name, iteration, np.cumsum(error) / iteration) for name, error in errors.items()
-    )
-    panel = Panel(x_label="iteration", y_label="mean error so far, m", traces=traces)
-    return Figure(key=key, title=title, panels=(panel,))
+def _cumulative(sailed: Mapping[str, Sailed]) -> Figure:
+    panels = []
+    for name, one in sailed.items():
+        if "path" not in name:
+            continue
+        iteration = _iterations(one)
+        errors = _errors(one) | {fusion: _error(one, fusion) for fusion in (GAIN, CENTRAL)}
+        traces = tuple(
+            Trace(who, iteration, np.cumsum(error) / iteration) for who, error in errors.items()
+        )
+        title = f"Case {name.replace(' path', '')}"
+        panel = Panel(
+            title=title, x_label="iteration", y_label="mean error so far, m", traces=traces
+        )
+        panels.append(panel)
+    title = "Cumulative mean errors (Figures 10, 12 and 15)"
+    return Figure(key="cumulative", title=title, panels=tuple(panels), columns=3)
 
 
 def _accuracy(sailed: Sailed) -> Figure:
@@ -166,26 +170,58 @@ def _coordinates(sailed: Sailed) -> Figure:
     return Figure(key="fig-14", title=title, panels=panels, columns=3)
 
 
-def _axes(table: Table) -> Figure:
-    ratio = np.array(AXES)
-    drawn = (GAIN, f"{GAIN}, fed back", "covariance intersection", "Bar-Shalom–Campo")
-    traces = tuple(
-        Trace(name, ratio, table.mean[table.rows.index(name)], "points") for name in drawn
+def _limits(axes: Table, gross: Table) -> Figure:
+    apart = tuple(
+        Trace(name, np.array(AXES), _row(axes, name), "points")
+        for name in (GAIN, "covariance intersection", "Bar-Shalom–Campo")
     )
-    panel = Panel(
-        x_label="σ of a master's two poor axes ÷ its good one",
-        y_label="RMSE ÷ centralised",
-        traces=traces,
+    share = 100.0 * np.array(GROSS)
+    wild = tuple(
+        Trace(name, share, _row(gross, name), "points") for name in (GAIN, f"{GAIN}, thresholds")
     )
-    title = "Masters that are good along one axis each: one weight is not enough"
-    return Figure(key="axes", title=title, panels=(panel,))
+    panels = (
+        Panel(
+            title="Masters that are good along one axis each",
+            x_label="σ of the two poor axes ÷ σ of the good one",
+            y_label="RMSE ÷ centralised",
+            traces=apart,
+        ),
+        Panel(
+            title="Gross errors",
+            x_label="gross errors, %",
+            y_label="RMSE, m",
+            traces=wild,
+        ),
+    )
+    title = "Where the gain weights fail, and what thresholds mend"
+    return Figure(key="limits", title=title, panels=panels, columns=2)
 
 
-def _late(late: Mapping[str, FloatArray]) -> Figure:
-    drawn = ("in order, as printed", "timely, as printed", "timely, gain weights")
-    traces = tuple(
-        Trace(name, late["time"], late[name]) for name in (*drawn, "replay of observations")
+def _late(late: Mapping[str, FloatArray], ratio: Table) -> Figure:
+    drawn = (
+        "in order, as printed",
+        "timely, as printed",
+        "timely, gain weights",
+        "replay of observations",
     )
-    panel = Panel(x_label="time, s", y_label="error, m", traces=traces)
+    channel = np.arange(1.0, len(ratio.columns) + 1.0)
+    panels = (
+        Panel(
+            title=f"Error, {ratio.columns[-1]}",
+            x_label="time, s",
+            y_label="error, m",
+            traces=tuple(Trace(name, late["time"], late[name]) for name in drawn),
+        ),
+        Panel(
+            title="From good to bad channels",
+            x_label="1 own periods, 2 + delay, 3 + loss, 4 + disorder",
+            y_label="RMSE ÷ centralised",
+            traces=tuple(Trace(name, channel, _row(ratio, name), "points") for name in drawn),
+        ),
+    )
     title = "Messages that come late, out of order or not at all"
-    return Figure(key="late", title=title, panels=(panel,))
+    return Figure(key="late", title=title, panels=panels, columns=2)
+
+
+def _row(table: Table, name: str) -> FloatArray:
+    return np.asarray(table.mean[table.rows.index(name)])

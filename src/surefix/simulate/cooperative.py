@@ -204,7 +204,7 @@ def _formation_2(time: FloatArray) -> FloatArray:
     """The four masters of case 2, (4, n, 3) m: two abeam, one that climbs and dives, one above."""
     ahead, still = _KNOT * time, np.zeros_like(time)
     turn = 2.0 * np.pi / _PERIOD * time
-    leader = (ahead + 45.0 * np.sin(turn), still + 30.0, 150.0 - 90.0 * np.cos(turn))
+    leader = (ahead + 6.0 * np.sin(turn), still + 30.0, 150.0 - 90.0 * np.cos(turn))
     abeam = [(ahead, still + side, still) for side in (-90.0, 90.0)]
     above = (1.2 * ahead - 40.0, still + 20.0, still - 80.0)
     return np.stack([np.stack(one, axis=-1) for one in (leader, *abeam, above)])
