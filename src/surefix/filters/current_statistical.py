@@ -103,7 +103,8 @@ def filter_current(
     after = CurrentState(before.mean.copy(), before.factor.copy())
     mean = np.empty((n, axes, _STATES))
     factor = np.empty((n, axes, _STATES, _STATES))
-    root = math.sqrt(2.0 * model.alpha) * np.linalg.cholesky(model.noise)
+    lower = np.linalg.cholesky(model.noise).astype(np.float64)
+    root = math.sqrt(2.0 * model.alpha) * lower
     forward = model.transition.copy()
     forward[:, 2] += model.mean_input
     _run(model.transition, forward, root, highest, z, R, after, mean, factor)

@@ -1,7 +1,8 @@
 """A robust recursion on medians: predict with a median velocity, gate by a median scale.
 
-Each axis on its own, samples at equal steps; a missing sample is NaN and keeps its step. With running
-medians (`surefix.cleaning.running_median`) over the last m samples, K the gain and c the gate:
+Each axis on its own, samples at equal steps; a missing sample is NaN and keeps its step. With
+running medians (`surefix.cleaning.running_median`) over the last m samples, K the gain and c the
+gate:
 
     v̂ = med Δy,   ŷ = x̂ + v̂,   r = y − ŷ,   s = 1.4826 med |r|,
     x̂ = ŷ + K r  where |r| ≤ c s,  else  x̂ = ŷ.
@@ -20,12 +21,12 @@ Medians reach up to the sample before, so v̂, ŷ and the gate are a prediction.
     of a running median. A rejected or missing sample enters the medians as its prediction, so that
     no burst reaches them.
 
-The last would believe its own prediction for ever after a true jump. Hence its promise: **a burst of
-up to L samples is survived, and after more than L rejected samples on end the state restarts** at
-the repeated-median line through them. All forms begin so, too, over their first m samples.
+The last would believe its own prediction for ever after a true jump. Hence its promise: **a burst
+of up to L samples is survived, and after more than L rejected samples on end the state restarts**
+at the repeated-median line through them. All forms begin so, too, over their first m samples.
 
-The model ``cv`` is a straight line. ``ca`` carries the velocity on from the middle of the window, to
-which its median belongs, with the median of the second differences over h ≈ m/3.
+The model ``cv`` is a straight line. ``ca`` carries the velocity on from the middle of the window,
+to which its median belongs, with the median of the second differences over h ≈ m/3.
 
 Source: paper 004, section 2.3; its equations 7–11 are lost, docs/papers/radar.md says how they were
 read. Siegel 1982, *Robust regression using repeated medians*, Biometrika 69, 242–244.
@@ -33,10 +34,10 @@ read. Siegel 1982, *Robust regression using repeated medians*, Biometrika 69, 24
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surefix.cleaning.running_median import SortedWindow, middle, push, sorted_window
 from surefix.errors import OptionsError
@@ -57,6 +58,7 @@ __all__ = [
 FORMS: Final = ("printed", "repeated-median", "feedback")
 """Readings of the recursion; a `MedianRecursion` holds the index."""
 
+_T = TypeVar("_T", np.float64, np.int64, np.bool_)
 _SCALE: Final = 1.4826022185056018  # σ of a normal distribution over its median absolute deviation
 _REPEATED, _FEEDBACK = FORMS.index("repeated-median"), FORMS.index("feedback")
 _USED, _REJECTED, _MISSING = int(Verdict.USED), int(Verdict.REJECTED), int(Verdict.MISSING)
@@ -99,11 +101,11 @@ class MedianState(NamedTuple):
     level
         (1,) estimate x̂; NaN before the first sample.
     tally
-        (3,) samples since the first, rejected samples on end, and samples since the first of those.
+        (3,) samples since the first, rejected samples on end, samples since the first of those.
     raw, clean
         (m,) last samples in a ring, as observed and as they entered the medians.
     first, second, size
-        Windows of the first and second differences over h, and of \\|r\\|.
+        Windows of the first and second differences over h, and of the size of the residuals.
     """
 
     level: FloatArray
@@ -169,13 +171,13 @@ def median_recursion(
     model
         ``cv`` or ``ca``; the repeated median only knows ``cv``.
     window
-        Samples m, at least 5. Not longer than the target keeps its velocity: up to 2 s in paper 004.
+        Samples m, at least 5. Not longer than the target keeps its velocity: 2 s in paper 004.
     lag
         Samples h between the ends of a difference. By default 1 if printed; else m/2, or m/3 for
         ``ca``.
     gain
-        K in 0 … 1. By default 0.1, but 0.4 for the printed form and 0.3 for ``ca``, whose velocities
-        are too noisy for less.
+        K in 0 … 1. By default 0.1, but 0.4 for the printed form and 0.3 for ``ca``, whose
+        velocities are too noisy for less.
     gate
         c in standard deviations, above 0.
     longest_burst
@@ -275,34 +277,49 @@ def filter_medians(
         np.zeros(shape, np.bool_),
     )
     for i, state in enumerate(after):
-        _run(options, np.ascontiguousarray(columns[i]), state, Recursed(*(row[i] for row in found)))
-    return after, Recursed(*(np.ascontiguousarray(row.T).reshape(given.shape) for row in found))
+        _run(options, np.ascontiguousarray(columns[i]), state, found, i)
+    return after, Recursed(
+        _shaped(found.estimate, given),
+        _shaped(found.rate, given),
+        _shaped(found.residual, given),
+        _shaped(found.scale, given),
+        _shaped(found.verdict, given),
+        _shaped(found.restart, given),
+    )
+
+
+def _shaped(rows: NDArray[_T], like: FloatArray) -> NDArray[_T]:
+    return np.ascontiguousarray(rows.T).reshape(like.shape)
 
 
 @kernel
-def _run(options: MedianRecursion, values: FloatArray, state: MedianState, out: Recursed) -> None:
+def _run(
+    options: MedianRecursion, values: FloatArray, state: MedianState, out: Recursed, i: int
+) -> None:
     m = options.window
     for k in range(len(values)):
         y = values[k]
         missing = np.isnan(y)
-        out.residual[k] = np.nan
-        out.verdict[k] = _MISSING if missing else _USED
+        out.residual[i, k] = np.nan
+        out.verdict[i, k] = _MISSING if missing else _USED
         if missing and state.tally[0] == 0:
             continue
         state.raw[state.tally[0] % m] = y
         state.tally[0] += 1
         if state.tally[0] <= m:
             _restart(options, state, state.tally[0])
-            out.residual[k] = y - state.level[0]
-            out.rate[k] = _rate(options, state)
+            out.residual[i, k] = y - state.level[0]
+            out.rate[i, k] = _rate(options, state)
         else:
-            _advance(options, y, state, out, k)
-        out.estimate[k] = state.level[0]
-        out.scale[k] = _scale(options, state)
+            _advance(options, y, state, out, i, k)
+        out.estimate[i, k] = state.level[0]
+        out.scale[i, k] = _scale(options, state)
 
 
 @helper
-def _advance(options: MedianRecursion, y: float, state: MedianState, out: Recursed, k: int) -> None:
+def _advance(
+    options: MedianRecursion, y: float, state: MedianState, out: Recursed, i: int, k: int
+) -> None:
     """Predict, gate, update, and let the sample into the medians."""
     rate = _rate(options, state)
     predicted = state.level[0] + rate
@@ -320,14 +337,14 @@ def _advance(options: MedianRecursion, y: float, state: MedianState, out: Recurs
     elif not missing or state.tally[1] > 0:
         state.tally[1] += 0 if missing else 1
         state.tally[2] += 1
-    out.rate[k] = rate
-    out.residual[k] = residual
+    out.rate[i, k] = rate
+    out.residual[i, k] = residual
     if not used and not missing:
-        out.verdict[k] = _REJECTED
+        out.verdict[i, k] = _REJECTED
     if options.longest_burst > 0 and state.tally[1] > options.longest_burst:
         _restart(options, state, min(state.tally[2], options.window))
-        out.restart[k] = True
-        out.verdict[k] = _USED
+        out.restart[i, k] = True
+        out.verdict[i, k] = _USED
 
 
 @helper

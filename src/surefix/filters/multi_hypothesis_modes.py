@@ -29,12 +29,12 @@ from surefix.filters.modes import (
 from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.offline import backward, needed_jumps
 from surefix.filters.records import Epochs, Estimate, Filtered, Motion, Recovery, TrackState
-from surefix.filters.rts import smooth
+from surefix.filters.rts import Smoothed, smooth
 from surefix.filters.track import blank, filter_track, start
 from surefix.robust.loss import loss_named
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["lagged_hypotheses", "offline_hypotheses", "realtime_hypotheses"]
+__all__ = ["decide_offline", "lagged_hypotheses", "offline_hypotheses", "realtime_hypotheses"]
 
 _SWEEPS = 6
 
@@ -114,9 +114,27 @@ def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate
     Estimate
         ``distance`` and ``standardised`` are deleted residuals; ``since`` marks the jumps.
     """
-    recovery, n = _steady(prior), len(epochs.time)
-    if not n:
+    if not len(epochs.time):
         return from_filtered(blank(motion, 0))
+    said, filtered, smoothed = decide_offline(motion, prior, epochs)
+    residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+    standardised = residual / np.sqrt(variance)
+    whole = from_smoothed(smoothed, from_filtered(filtered))
+    whole = whole._replace(standardised=standardised, distance=np.abs(standardised))
+    return _named(motion, epochs, said, whole)
+
+
+def decide_offline(
+    motion: Motion, prior: Prior, epochs: Epochs
+) -> tuple[Decisions, Filtered, Smoothed]:
+    """Decide what belongs to the track by the whole series, and filter and smooth it.
+
+    Parameters
+    ----------
+    motion, prior, epochs
+        As for the filter; at least one epoch.
+    """
+    recovery, n = _steady(prior), len(epochs.time)
     ahead = _decided(motion, prior, epochs)
     back = _decided(motion, prior, backward(motion, epochs))
     said = Decisions(
@@ -133,11 +151,7 @@ def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
         said = Decisions(fixed, jump, said.run)
-    residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
-    standardised = residual / np.sqrt(variance)
-    whole = from_smoothed(smoothed, from_filtered(filtered))
-    whole = whole._replace(standardised=standardised, distance=np.abs(standardised))
-    return _named(motion, epochs, said, whole)
+    return said, filtered, smoothed
 
 
 def _steady(prior: Prior) -> Recovery:

@@ -23,6 +23,7 @@ __all__ = [
     "difference_scale",
     "estimate_noise",
     "grain",
+    "sample_of",
     "speed_scale",
     "variances",
 ]
@@ -144,7 +145,7 @@ def estimate_noise(
     quantum, velocity_quantum
         Resolution of positions and velocities: no estimate falls below ``quantum/√12``.
     """
-    sample = _thin(observations)
+    sample = sample_of(observations)
     axes = sample.z.shape[1] // 2
     start_position = _initial(sample, given.position, slice(0, axes), period)
     start_velocity = _initial(sample, given.velocity, slice(axes, 2 * axes), 0.0)
@@ -201,7 +202,7 @@ def _bounded(theta: FloatArray) -> FloatArray:
     return np.asarray(np.exp(np.clip(theta, -3.4, 3.4)))
 
 
-def _thin(observations: Observations) -> Observations:
+def sample_of(observations: Observations) -> Observations:
     """Keep a few thousand rows: blocks of neighbours, evenly spread over the log.
 
     The blocks are as long as the slowest sensor needs; faster sensors are thinned within them.

@@ -1,0 +1,218 @@
+"""What the multi-hypothesis filter learns from a log: noise figures, and how often fixes are wrong.
+
+In turns: decide which observations belong to the track under the present figures; take the figures
+that make these likeliest; count what was left out. A gross error then no longer counts in the
+noise, and what is supposed of gross errors is what the log shows.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from surefix.filters.hypotheses import Prior, no_hypotheses
+from surefix.filters.hypothesis_review import deleted_residuals
+from surefix.filters.multi_hypothesis import filter_hypotheses
+from surefix.filters.multi_hypothesis_modes import decide_offline
+from surefix.filters.noise import NoiseFigures, Observations, sample_of, variances
+from surefix.filters.records import Epochs, Motion
+from surefix.filters.track import by_axis
+from surefix.types import FloatArray
+
+__all__ = ["Learnt", "learn", "supposed"]
+
+_ROUNDS = 3
+_ENOUGH = 0.02  # relative change of the figures that ends the rounds
+_WILD = 30.0  # scale of gross errors to begin with, in standard deviations
+_LEAST_WILD = 5.0  # … and at least
+_SHARES = {"isolated": (2.0, 50.0), "partial": (0.2, 50.0)}  # prior counts: wrong, and all
+_FEW = 5  # gross errors whose scale is believed
+_WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
+_BEGIN = 3  # epochs whose likelihood is that of the start
+
+
+class Learnt(NamedTuple):
+    """Noise figures of one block of axes, and what to suppose of its gross errors.
+
+    Parameters
+    ----------
+    figures
+        As `surefix.filters.noise.estimate_noise` gives them.
+    prior
+        Of a filter on these axes.
+    """
+
+    figures: NoiseFigures
+    prior: Prior
+
+
+def supposed(
+    axes: int, sigma_position: float, sigma_velocity: float, speed: float, longest: float
+) -> Prior:
+    """What is supposed of a log that nothing is known of.
+
+    Parameters
+    ----------
+    axes
+        How many there are.
+    sigma_position, sigma_velocity
+        Usual noise, m and m/s.
+    speed
+        Standard deviation of a velocity nothing is known about, m/s.
+    longest
+        Longest run, s.
+    """
+    return Prior(
+        isolated=0.05,
+        partial=0.005,
+        burst=0.001,
+        ending=1.0 / 15.0,
+        longest=longest,
+        velocity=0.02,
+        again=0.9,
+        spread=np.repeat([_WILD * sigma_position, _WILD * sigma_velocity], axes),
+        sigma_velocity=speed,
+    )
+
+
+def learn(
+    observations: Observations,
+    given: NoiseFigures,
+    first: NoiseFigures,
+    *,
+    order: int,
+    period: float,
+    speed: float,
+    longest: float,
+    floor: tuple[float, float],
+) -> Learnt:
+    """Learn the figures that ``given`` leaves NaN, and the prior.
+
+    Parameters
+    ----------
+    observations
+        The log; a few thousand rows in blocks spread over it are used.
+    given, first
+        Figures that are known, and others to begin with.
+    order, period
+        Of the motion model.
+    speed, longest
+        As for `supposed`.
+    floor
+        Least standard deviations of positions and velocities: their resolution over √12.
+    """
+    sample = sample_of(observations)
+    axes = sample.z.shape[1] // 2
+    figures = first
+    prior = supposed(axes, *_usual(figures), speed, longest)
+    if len(sample.time) < 3 or not np.isfinite(first.position).any():
+        return Learnt(figures, prior)
+    for _ in range(_ROUNDS):
+        motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
+        said, filtered, smoothed = decide_offline(motion, prior, epochs)
+        residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        prior = _counted(prior, said.fixed, residual, math.sqrt(float(np.median(epochs.variance))))
+        before = figures
+        figures = _likeliest(sample, said.fixed, prior, given, before, floor, motion)
+        if _change(before, figures) < _ENOUGH:
+            break
+    return Learnt(figures, prior)
+
+
+def _motion(figures: NoiseFigures, axes: int, order: int, period: float) -> Motion:
+    return Motion(order, axes, np.full(axes, figures.process**2), by_axis(axes), 2 * axes, period)
+
+
+def _epochs(sample: Observations, figures: NoiseFigures) -> Epochs:
+    n, m = sample.z.shape
+    return Epochs(
+        sample.time,
+        sample.z,
+        variances(sample, figures),
+        np.full((n, m), np.nan),
+        np.zeros(n, np.int64),
+        sample.sensor,
+    )
+
+
+def _usual(figures: NoiseFigures) -> tuple[float, float]:
+    """Median noise of positions and of velocities over the sensors, 1 where there is none."""
+    known = [part[np.isfinite(part)] for part in (figures.position, figures.velocity)]
+    position, velocity = (float(np.median(part)) if len(part) else 1.0 for part in known)
+    return position, velocity
+
+
+def _counted(prior: Prior, fixed: FloatArray, residual: FloatArray, sigma: float) -> Prior:
+    """Shares and size of the gross errors among the positions that were decided."""
+    axes = fixed.shape[1] // 2
+    seen = np.isfinite(residual[:, :axes])
+    out = seen & (fixed[:, :axes] == 0.0)
+    whole = out.any(axis=1) & (out == seen).all(axis=1)
+    counts = {"isolated": whole.sum(), "partial": (out.any(axis=1) & ~whole).sum()}
+    total = seen.any(axis=1).sum()
+    shares = {
+        name: float((counts[name] + wrong) / (total + everything))
+        for name, (wrong, everything) in _SHARES.items()
+    }
+    spread = prior.spread.copy()
+    if out.sum() >= _FEW:
+        size = float(np.median(np.abs(residual[:, :axes][out])))
+        spread[:axes] = max(size, _LEAST_WILD * sigma)
+    return prior._replace(spread=spread, **shares)
+
+
+def _likeliest(
+    sample: Observations,
+    fixed: FloatArray,
+    prior: Prior,
+    given: NoiseFigures,
+    first: NoiseFigures,
+    floor: tuple[float, float],
+    motion: Motion,
+) -> NoiseFigures:
+    """Figures that maximise the likelihood of what was decided to belong to the track."""
+    free_position = np.isnan(given.position) & np.isfinite(first.position)
+    free_velocity = np.isnan(given.velocity) & np.isfinite(first.velocity)
+    i = int(free_position.sum())
+    j = i + int(free_velocity.sum())
+    size = j + int(math.isnan(given.process))
+    if size == 0:
+        return first
+
+    def figures(theta: FloatArray) -> NoiseFigures:
+        factor: FloatArray = np.exp(np.clip(theta, -_WIDEST, _WIDEST))
+        p, v = first.position.copy(), first.velocity.copy()
+        p[free_position] = np.maximum(p[free_position] * factor[:i], floor[0])
+        v[free_velocity] = np.maximum(v[free_velocity] * factor[i:j], floor[1])
+        return NoiseFigures(p, v, float(first.process * factor[j]) if size > j else first.process)
+
+    def cost(theta: FloatArray) -> float:
+        trial = figures(theta)
+        epochs = _epochs(sample, trial)._replace(fixed=fixed)
+        moving = motion._replace(density=np.full(motion.axes, trial.process**2))
+        one = no_hypotheses(motion, 1)
+        _, found, _ = filter_hypotheses(moving, prior, epochs, one, traced=False)
+        return -float(found.evidence[_BEGIN:].sum())
+
+    found = minimize(
+        cost,
+        np.zeros(size),
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": np.vstack([np.zeros(size), 0.25 * np.eye(size)]),
+            "xatol": 0.01,
+            "fatol": 0.1,
+            "maxiter": 40 * size,
+        },
+    )
+    return figures(found.x)._replace(cost=float(found.fun))
+
+
+def _change(before: NoiseFigures, after: NoiseFigures) -> float:
+    """Largest relative change of a figure."""
+    pairs = [*zip(before.position, after.position, strict=True)]
+    pairs += [*zip(before.velocity, after.velocity, strict=True), (before.process, after.process)]
+    return max(abs(math.log(b / a)) for a, b in pairs if a > 0.0 and b > 0.0)
