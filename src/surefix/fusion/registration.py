@@ -1,23 +1,23 @@
 """Registration: the systematic errors of radars, from targets they see together.
 
-A radar measures ``m = polar(x) + b + noise`` with constant errors b of range, azimuth and elevation.
-Two ways to find b:
+A radar measures ``m = polar(x) + b + noise`` with constant errors b of range, azimuth and
+elevation. Two ways to find b:
 
 `reference_bias`, in real time
-    Against a better position of the target (satellite navigation, a registered radar) the difference
-    in the radar's own coordinates is b plus noise, and its running median is b, whatever a minority
-    of wild measurements says (paper 004 registers with its real-time median).
+    Against a better position of the target (satellite navigation, a registered radar) the
+    difference in the radar's own coordinates is b plus noise, and its running median is b, whatever
+    a minority of wild measurements says (paper 004 registers with its real-time median).
 `register`, without a reference
-    Several radars that see the target at the same times contradict each other by their errors alone.
-    With J the Jacobian of radar i and x̂ the target's position by all of them,
+    Several radars that see the target at the same times contradict each other by their errors
+    alone. With J the Jacobian of radar i and x̂ the target's position by all of them,
 
         p_i(m − b) − x̂ = J_i δb_i − Σ_j W_j J_j δb_j / Σ_j W_j + noise,
 
     is solved by Gauss–Newton with the unknown positions eliminated. Epochs of a large misfit are
     down-weighted, because a wild measurement of either radar spoils them.
 
-How well b can be told apart depends on the geometry: radars at one place only show the difference of
-their errors. A weak prior keeps the solution bounded, and the covariance says what is known.
+How well b can be told apart depends on the geometry: radars at one place only show the difference
+of their errors. A weak prior keeps the solution bounded, and the covariance says what is known.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def register(
             break
     told = np.full(len(use), np.nan)
     told[use] = weight
-    return Registration(bias, covariance, scale, told)
+    return Registration(bias, np.asarray(covariance, dtype=np.float64), scale, told)
 
 
 def _normal(

@@ -15,8 +15,8 @@ g(s) = [φ₁(s), φ₂(s), e^{−αs}], φ₂ = (1 − e^{−αs})/α, φ₁ = 
 The closed forms of Q cancel to nothing as αT → 0; there power series take their place, so that the
 limit α = 0 is the model of constant acceleration, Q its white-jerk noise, to the last digit.
 
-In the current statistical model ā is the newest estimate of the acceleration, and σ² follows it by a
-Rayleigh distribution between −a_max and a_max (`rayleigh_variance`).
+In the current statistical model ā is the newest estimate of the acceleration, and σ² follows it by
+a Rayleigh distribution between −a_max and a_max (`rayleigh_variance`).
 
 Sources: Singer 1970, IEEE Trans. AES 6, 473–483; Zhou and Kumar 1984, *A current statistical model
 and adaptive algorithm for estimating maneuvering targets*, J. Guidance 7, 596–602.

@@ -78,7 +78,7 @@ def _median(values: FloatArray, n: int) -> float:
     lower = values[0]
     for i in range(1, n // 2):
         lower = max(lower, values[i])
-    return 0.5 * lower + 0.5 * upper
+    return 0.5 * float(lower) + 0.5 * upper
 
 
 @helper
