@@ -78,6 +78,8 @@ def write(paper: str) -> list[Path]:
 def _dress(axes: Axes, panel: Panel) -> None:
     axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
     axes.set_axisbelow(True)
+    if panel.x_names:
+        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=30, ha="right")
     if panel.log_y:
         axes.set_yscale("log")
     if panel.y_range is not None:

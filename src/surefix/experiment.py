@@ -46,6 +46,8 @@ class Table:
         Decimals to show.
     note
         What a reader must know, or empty.
+    of
+        What a row is.
     """
 
     key: str
@@ -57,6 +59,7 @@ class Table:
     printed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     digits: int = 3
     note: str = ""
+    of: str = "Method"
 
     @property
     def mean(self) -> FloatArray:
@@ -115,6 +118,8 @@ class Panel:
         Logarithmic y axis.
     equal
         One metre is as long on both axes.
+    x_names
+        Names of x = 0, 1, 2 …, where these count things; empty where x is a quantity.
     """
 
     title: str = ""
@@ -124,6 +129,7 @@ class Panel:
     y_range: tuple[float, float] | None = None
     log_y: bool = False
     equal: bool = False
+    x_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,12 +194,13 @@ def gather(
     printed: Mapping[str, tuple[float, ...]] | None = None,
     digits: int = 3,
     note: str = "",
+    of: str = "Method",
 ) -> Table:
     """Make a table of what every run gave.
 
     Parameters
     ----------
-    key, title, unit, printed, digits, note
+    key, title, unit, printed, digits, note, of
         Of `Table`.
     columns
         Names of the columns.
@@ -221,4 +228,5 @@ def gather(
         printed=dict(printed or {}),
         digits=digits,
         note=note,
+        of=of,
     )

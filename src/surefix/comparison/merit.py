@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from surefix.pipelines.options import Mode
 from surefix.simulate.contamination import Trial
 from surefix.types import BoolArray, Cleaned, FloatArray, Reason, Verdict
 
-__all__ = ["GROSS_SIGMA", "Merit", "judged_rows", "merit"]
+__all__ = ["GROSS_SIGMA", "Merit", "Outcome", "Outcomes", "judge"]
 
 GROSS_SIGMA: Final = 8.0
 """Errors of an axis that exceed it are to be rejected without exception."""
@@ -54,7 +55,18 @@ class Merit(NamedTuple):
     back_s: float
 
 
-def merit(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Merit:
+class Outcome(NamedTuple):
+    """What became of one trial: its figures, and (n,) the error of every row, m."""
+
+    merit: Merit
+    error: FloatArray
+
+
+Outcomes = Mapping[tuple[str, Mode, str], Outcome]
+"""Of one scenario and run: ``aided`` by velocities or ``alone``, the mode, the method → outcome."""
+
+
+def judge(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Outcome:
     """Hold a result against truth and oracle.
 
     Parameters
@@ -69,23 +81,24 @@ def merit(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Merit:
         In real time the first rows and those just after a jump are not judged: nothing can know.
     """
     d = trial.world.axes
-    rows = judged_rows(trial, mode)
-    error = (cleaned.track.position[:, :d] - trial.position)[rows]
-    sigma = cleaned.track.sigma_position[:, :d][rows]
-    least = (best.position - trial.position)[rows]
+    rows = _judged(trial, mode)
+    error = cleaned.track.position[:, :d] - trial.position
+    least = best.position - trial.position
+    squares = error[rows] ** 2
     gross, good = _rejected(trial, cleaned)
     noise = _noise_ratios(trial, cleaned)
-    return Merit(
-        float(np.sqrt((error**2).mean() / (least**2).mean())),
-        float((error**2 / sigma**2).mean()),
+    merit = Merit(
+        float(np.sqrt(squares.mean() / (least[rows] ** 2).mean())),
+        float((squares / cleaned.track.sigma_position[rows, :d] ** 2).mean()),
         gross,
         good,
         *noise,
         _back(trial, cleaned.track.position[:, :d], best),
     )
+    return Outcome(merit, np.sqrt((error**2).sum(axis=1)))
 
 
-def judged_rows(trial: Trial, mode: Mode) -> BoolArray:
+def _judged(trial: Trial, mode: Mode) -> BoolArray:
     """(n,) rows that a mode is judged on."""
     rows = np.ones(len(trial.time), np.bool_)
     if mode == "realtime":

@@ -8,9 +8,9 @@ from typing import get_args
 
 from surefix.errors import OptionsError
 from surefix.pipelines.options import CleanOptions, Mode
-from surefix.simulate.contamination import SCENARIOS, World
+from surefix.simulate.contamination import SCENARIOS, World, draw_world
 
-__all__ = ["MODES", "CompareOptions"]
+__all__ = ["MODES", "CompareOptions", "world_of"]
 
 MODES: tuple[Mode, ...] = ("offline", "lagged", "realtime")
 """The modes in the order of the tables."""
@@ -68,6 +68,11 @@ class CompareOptions:
     def trials(self) -> int:
         """How many logs are drawn: what `compare` tells its progress in."""
         return self.runs * len(self.scenarios)
+
+
+def world_of(options: CompareOptions, run: int) -> World:
+    """Vehicle and sensors of one run, counted from 0."""
+    return options.world or draw_world((options.seed, run), epochs=options.epochs)
 
 
 def _known(what: str, given: Sequence[str], known: Sequence[str]) -> None:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import NamedTuple
 
-from surefix.comparison.merit import Merit, merit
-from surefix.comparison.options import CompareOptions
+from surefix.comparison.figures import figures
+from surefix.comparison.findings import findings
+from surefix.comparison.merit import Outcome, Outcomes, judge
+from surefix.comparison.options import CompareOptions, world_of
 from surefix.comparison.oracle import lag_of, oracle
 from surefix.comparison.tables import tables
 from surefix.experiment import Experiment, Progress
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.options import CleanOptions, Mode
-from surefix.simulate.contamination import Trial, World, alone, columns, draw, draw_world
+from surefix.simulate.contamination import Trial, World, alone, columns, draw
 from surefix.types import Cleaned
 
-__all__ = ["clean_trial", "compare", "merits"]
+__all__ = ["clean_trial", "compare", "outcomes"]
 
 
 class _Task(NamedTuple):
@@ -40,7 +43,7 @@ def compare(options: CompareOptions, progress: Progress | None = None) -> Experi
     progress
         Told the number of finished trials, of ``options.trials``.
     """
-    found = []
+    found: list[Outcomes] = []
     for done, each in enumerate(_done(_tasks(options), options.jobs), start=1):
         found.append(each)
         if progress is not None:
@@ -50,22 +53,23 @@ def compare(options: CompareOptions, progress: Progress | None = None) -> Experi
         dict(zip(options.scenarios, found[i : i + size], strict=True))
         for i in range(0, len(found), size)
     ]
+    made = tables(options, runs)
+    drawn = "each run with a noise, rate and agility of its own"
     return Experiment(
         paper="compare",
         title="Methods against an oracle that knows every fault",
-        source="simulated logs, each run with its own noise, rate and agility"
-        if options.world is None
-        else "simulated logs of one vehicle",
+        source=f"Simulated logs, {drawn if options.world is None else 'all of one vehicle'}",
         seed=options.seed,
         runs=options.runs,
-        tables=tables(options, runs),
-        figures=(),
+        tables=made,
+        figures=figures(options, {table.key: table for table in made}, runs[0]),
+        findings=findings(options, {table.key: table for table in made}),
     )
 
 
-def merits(
+def outcomes(
     trial: Trial, methods: Sequence[str], modes: Sequence[Mode]
-) -> dict[tuple[Mode, str], Merit]:
+) -> dict[tuple[Mode, str], Outcome]:
     """Clean one trial by several methods in several modes.
 
     Parameters
@@ -79,7 +83,7 @@ def merits(
     for mode in modes:
         best = oracle(trial, mode)
         for method in methods:
-            found[mode, method] = merit(trial, clean_trial(trial, method, mode), best, mode)
+            found[mode, method] = judge(trial, clean_trial(trial, method, mode), best, mode)
     return found
 
 
@@ -107,28 +111,27 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
 
 def _tasks(options: CompareOptions) -> Iterator[_Task]:
     for i in range(options.runs):
-        seed = (options.seed, i)
-        world = options.world or draw_world(seed, epochs=options.epochs)
+        world = world_of(options, i)
         for scenario in options.scenarios:
-            yield _Task(scenario, world, seed, options.methods, options.modes)
+            yield _Task(scenario, world, (options.seed, i), options.methods, options.modes)
 
 
-def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[dict[tuple[bool, Mode, str], Merit]]:
+def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[Outcomes]:
     """Results in the order of the tasks."""
     if jobs == 1:
         yield from map(_run, tasks)
         return
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run, tasks)
 
 
-def _run(task: _Task) -> dict[tuple[bool, Mode, str], Merit]:
-    """Figures by whether velocities were there, mode and method."""
+def _run(task: _Task) -> Outcomes:
     trial = draw(task.scenario, task.world, task.seed)
-    aided = merits(trial, task.methods, task.modes)
-    unaided = {}
-    if not trial.scenario.velocity_runs:  # whose faults are those of the velocities
-        unaided = merits(alone(trial), task.methods, task.modes)
-    return {(True, *key): value for key, value in aided.items()} | {
-        (False, *key): value for key, value in unaided.items()
+    both = {"aided": trial, "alone": alone(trial)}
+    if trial.scenario.velocity_runs:  # whose faults are those of the velocities
+        del both["alone"]
+    return {
+        (kind, *key): outcome
+        for kind, each in both.items()
+        for key, outcome in outcomes(each, task.methods, task.modes).items()
     }

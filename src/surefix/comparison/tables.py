@@ -7,21 +7,21 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from surefix.comparison.merit import Merit
+from surefix.comparison.merit import Merit, Outcome, Outcomes
 from surefix.comparison.options import CompareOptions
 from surefix.experiment import Table, gather
 from surefix.pipelines.options import Mode
 
-__all__ = ["MODE_WORDS", "SHOWN", "Runs", "tables"]
-
-Runs = Sequence[Mapping[str, Mapping[tuple[bool, Mode, str], Merit]]]
-"""A run, a scenario, whether there were velocities, the mode and the method → figures."""
+__all__ = ["KIND_WORDS", "MODE_WORDS", "SHOWN", "tables"]
 
 MODE_WORDS: Final[Mapping[str, str]] = {
     "offline": "offline",
     "lagged": "lagged",
     "realtime": "real time",
 }
+
+
+KIND_WORDS: Final[Mapping[str, str]] = {"aided": "with velocities", "alone": "fixes alone"}
 
 
 class _Column(NamedTuple):
@@ -45,51 +45,55 @@ SHOWN: Final[Mapping[str, _Column]] = {
 """Fields of `Merit` in the order of the tables."""
 
 
-def tables(options: CompareOptions, runs: Runs) -> tuple[Table, ...]:
+def tables(options: CompareOptions, runs: Sequence[Mapping[str, Outcomes]]) -> tuple[Table, ...]:
     """Make a table of scenarios (rows) and methods (columns) of each figure, mode and kind of log.
 
     Keys are ``FIGURE-MODE-aided`` and ``FIGURE-MODE-alone``; tables without any figure are left
     out, and rows without any in a table.
+
+    Parameters
+    ----------
+    options
+        What was compared.
+    runs
+        Outcomes by scenario, of every run.
     """
     made = []
     for figure in SHOWN:
         for mode in options.modes:
-            for aided in (True, False):
-                table = _table(figure, mode, aided, options, runs)
+            for kind in KIND_WORDS:
+                table = _table(figure, mode, kind, options, runs)
                 if len(table.rows):
                     made.append(table)
     return tuple(made)
 
 
-def _table(figure: str, mode: Mode, aided: bool, options: CompareOptions, runs: Runs) -> Table:
+def _table(
+    figure: str,
+    mode: Mode,
+    kind: str,
+    options: CompareOptions,
+    runs: Sequence[Mapping[str, Outcomes]],
+) -> Table:
     shown = SHOWN[figure]
-    kind = "with velocities" if aided else "fixes alone"
-    missing = Merit(*[np.nan] * len(Merit._fields))
+    missing = Outcome(Merit(*[np.nan] * len(Merit._fields)), np.empty(0))
     lines = [
         {
             scenario: [
-                getattr(found[scenario].get((aided, mode, method), missing), figure)
+                getattr(run[scenario].get((kind, mode, method), missing).merit, figure)
                 for method in options.methods
             ]
             for scenario in options.scenarios
         }
-        for found in runs
+        for run in runs
     ]
-    whole = gather(
-        f"{figure}-{mode}-{'aided' if aided else 'alone'}",
-        f"{shown.title}, {MODE_WORDS[mode]}, {kind}",
-        options.methods,
-        lines,
-        unit=shown.unit,
-        digits=shown.digits,
-    )
-    known = np.isfinite(whole.values).sum(axis=(0, 2))
-    kept = [row for i, row in enumerate(whole.rows) if known[i] > 0]
+    kept = [row for row in options.scenarios if any(np.isfinite(line[row]).any() for line in lines)]
     return gather(
-        whole.key,
-        whole.title,
+        f"{figure}-{mode}-{kind}",
+        f"{shown.title}, {MODE_WORDS[mode]}, {KIND_WORDS[kind]}",
         options.methods,
         [{row: line[row] for row in kept} for line in lines],
         unit=shown.unit,
         digits=shown.digits,
+        of="Scenario",
     )

@@ -25,7 +25,7 @@ COLOURS: Final = (
 _DASHES: Final = ("solid", "dash", "dot")
 _PANEL: Final = 300.0  # px, height of a panel
 _GAP: Final = 86.0  # px between rows of panels
-_FOOTER: Final = "Made with surefix reproduce. Every figure was computed for this page."
+_FOOTER: Final = "Made with surefix. Every figure was computed for this page."
 
 
 def write_experiment(experiment: Experiment, path: str | Path) -> None:
@@ -98,7 +98,7 @@ def _table(shown: Table) -> str:
             printed = [number(v, shown.digits) for v in shown.printed[row]]
             rows.append(["<small>printed in the paper</small>", *printed])
     note = f'<p class="note">{escape(shown.note)}</p>' if shown.note else ""
-    names = ["Method", *(f"{escape(column)}#" for column in shown.columns)]
+    names = [escape(shown.of), *(f"{escape(column)}#" for column in shown.columns)]
     return table(names, rows, kind="experiment") + note
 
 
@@ -121,7 +121,7 @@ def _drawn(picture: Picture) -> Figure:
         low_x, high_x = _share(column, columns, 0.07)
         low_y, high_y = _share(rows - 1 - row, rows, _GAP / height)
         name = str(i) if i > 1 else ""
-        axes[f"xaxis{name}"] = axis(panel.x_label, domain=[low_x, high_x], anchor=f"y{name}")
+        axes[f"xaxis{name}"] = _x_axis(panel, [low_x, high_x], name)
         axes[f"yaxis{name}"] = _y_axis(panel, [low_y, high_y], name)
         titles.append(_title(panel.title, low_x, high_y))
         where = {"xaxis": f"x{name}", "yaxis": f"y{name}"}
@@ -144,6 +144,15 @@ def _share(place_: int, places: int, gap: float) -> tuple[float, float]:
     width = (1.0 - gap * (places - 1)) / places
     low = place_ * (width + gap)
     return low, min(low + width, 1.0)
+
+
+def _x_axis(panel: Panel, domain: list[float], name: str) -> dict[str, Any]:
+    more: dict[str, Any] = {"domain": domain, "anchor": f"y{name}"}
+    if panel.x_names:
+        places = list(range(len(panel.x_names)))
+        more |= {"tickvals": places, "ticktext": [escape(each) for each in panel.x_names]}
+        more |= {"tickangle": -30}
+    return axis(panel.x_label, **more)
 
 
 def _y_axis(panel: Panel, domain: list[float], name: str) -> dict[str, Any]:
