@@ -88,8 +88,11 @@ def clean(
         typer.Option(help="How much of the log each fix is judged by; default offline, all of it."),
     ] = None,
     method: Annotated[
-        Literal["kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t"] | None,
-        typer.Option(help="The robust loss; default igg3."),
+        Literal[
+            "multi-hypothesis", "kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t"
+        ]
+        | None,
+        typer.Option(help="Several hypotheses, or one with a robust loss; default igg3."),
     ] = None,
     model: Annotated[
         Literal["auto", "cv", "ca"] | None,

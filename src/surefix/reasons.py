@@ -21,7 +21,7 @@ _FIXED = {
     Reason.ACCEPTED_BY_USER: "accepted by the user",
     Reason.REJECTED_BY_USER: "rejected by the user",
 }
-_BLOCKS = {1: "horizontally", 2: "vertically", 3: "horizontally and vertically"}
+_AXES = ("x", "y")
 
 
 def clock(time: float) -> str:
@@ -38,6 +38,13 @@ def clock(time: float) -> str:
     return f"{datetime.fromtimestamp(tenths // 10, UTC):%H:%M:%S}.{tenths % 10}"
 
 
+def _where(mask: int) -> str:
+    """Which axes an axis mask means."""
+    flat = [name for i, name in enumerate(_AXES) if (mask >> i) & 1]
+    named = ["horizontally" if len(flat) == 2 else f"along {name}" for name in flat[:1]]
+    return " and ".join([*named, *(["vertically"] if mask & 4 else [])])
+
+
 def _text(reason: int, verdict: int, weight: float, sigma: float, detail: float) -> str:
     match reason:
         case Reason.OFF if verdict == Verdict.REJECTED:
@@ -45,7 +52,9 @@ def _text(reason: int, verdict: int, weight: float, sigma: float, detail: float)
         case Reason.OFF:
             return f"{sigma:.1f} σ off, weight {weight:.2f}"
         case Reason.AXIS_OFF:
-            return f"{sigma:.1f} σ off {_BLOCKS[int(detail)]}, the rest used"
+            return f"{sigma:.1f} σ off {_where(int(detail))}, the rest used"
+        case Reason.RUN:
+            return f"in a run of {int(detail)} that are wrong together, {sigma:.1f} σ off"
         case Reason.JUMP:
             return f"jump accepted, dated back to {clock(detail)}"
         case Reason.REPEATED:

@@ -199,6 +199,7 @@ class Reason(IntEnum):
     LATE = 10
     ACCEPTED_BY_USER = 11
     REJECTED_BY_USER = 12
+    RUN = 13
 
 
 class Verdicts(NamedTuple):
@@ -220,7 +221,7 @@ class Verdicts(NamedTuple):
         (n,) codes of `Reason`.
     detail
         (n,) the figure that goes with the reason: a time in s (JUMP, HELD, LATE: the time it refers
-        to) or an axis mask (AXIS_OFF: bit 0 horizontal, bit 1 vertical).
+        to), an axis mask (AXIS_OFF: bits 0, 1, 2 for x, y, z) or a number of fixes (RUN).
     """
 
     verdict: IntArray

@@ -14,6 +14,7 @@ __all__ = [
     "CONTINUE",
     "DROP",
     "MOST",
+    "MOST_SENSORS",
     "OPEN",
     "VELOCITY_OUT",
     "Bank",
@@ -25,6 +26,9 @@ __all__ = [
 
 MOST: Final = 64
 """Hypotheses kept after each epoch."""
+
+MOST_SENSORS: Final = 62
+"""Sensors that are told apart; any more count as the last one."""
 
 # What a hypothesis says of an epoch: bits 0 … 2 are the axes of the position that are wrong by
 # themselves; the others say what became of a run of fixes with a common offset.

@@ -116,7 +116,7 @@ def _cut(filtered: Filtered, first: int, last: int) -> Filtered:
 
 
 def write_rows(kept: Filtered, at: int, out: Filtered, count: int) -> None:
-    """Put the first ``count`` epochs of ``out`` in the place of those of ``kept`` from ``at`` on."""
+    """Put the first ``count`` epochs of ``out`` into ``kept``, from epoch ``at`` on."""
     for whole, part in zip(kept, out, strict=True):
         whole[at : at + count] = part[:count]
 

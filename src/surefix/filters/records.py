@@ -168,4 +168,4 @@ class Estimate(NamedTuple):
     standardised: FloatArray
     jump: IntArray
     since: FloatArray
-    run: IntArray = np.empty(0, np.int64)  # noqa: RUF012
+    run: IntArray = np.empty(0, np.int64)

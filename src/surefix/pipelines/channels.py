@@ -8,13 +8,15 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
+from surefix.filters.hypotheses import Prior
+from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
-from surefix.filters.records import Epochs, Motion, Recovery, TrackState
-from surefix.filters.track import by_block, start
+from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.track import by_axis
 from surefix.geo.angle import wrap
 from surefix.models.motion import MODELS
-from surefix.pipelines.judge import blank_status, estimate, verdicts
-from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.judge import FilterState, begin, blank_status, estimate, verdicts
+from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
 from surefix.pipelines.present import UNKNOWN
 from surefix.pipelines.setup import FARTHEST
 from surefix.types import (
@@ -32,6 +34,7 @@ CHANNEL_HEAD = 2000
 """Values that a series is settled on in real time; the other modes see it whole."""
 
 _RECOVERY_VALUES = 30
+_RUN_VALUES = 40  # longest run of wrong values that several hypotheses survive
 _LAG_VALUES = 20
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
@@ -45,10 +48,11 @@ class ChannelState(NamedTuple):
     repeats: RepeatState | None = None
     motion: Motion | None = None
     recovery: Recovery = Recovery(np.inf, 1.0)
+    prior: Prior | None = None
     lag: float = 0.0
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
-    filter: TrackState | None = None
+    filter: FilterState | None = None
 
     def nothing(self) -> Channel:
         """An empty part of the series that was begun."""
@@ -118,6 +122,7 @@ def clean_channel(
         options,
         state.motion,
         state.recovery,
+        state.prior,
         state.lag,
         epochs,
         np.ones(n, np.bool_),
@@ -160,18 +165,31 @@ def _settle(
     )
     unknown = NoiseFigures(np.array([np.nan]), np.array([np.nan]), np.nan)
     order = MODELS["cv" if options.model == "auto" else options.model]
-    figures = estimate_noise(
-        observations, unknown, order=order, period=new.period, quantum=grain(z[seen])
-    )
+    quantum = grain(z[seen])
+    figures = estimate_noise(observations, unknown, order=order, period=new.period, quantum=quantum)
     steps = np.diff(tau[seen])
     steps = steps[steps > 0.0]
     interval = float(np.median(steps)) if len(steps) else 1.0
     turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
-    motion = Motion(order, 1, np.array([figures.process**2]), by_block((0,)), 2, new.period)
+    several = options.method == MULTI_HYPOTHESIS
+    values_lost = _RUN_VALUES if several else _RECOVERY_VALUES
     recovery = Recovery(
-        float(options.recovery_s or _RECOVERY_VALUES * interval),
+        float(options.recovery_s or values_lost * interval),
         max(speed_scale(tau[seen], turned), 1e-6),
     )
+    prior = None
+    if several:
+        figures, prior = learn(
+            observations,
+            unknown,
+            figures,
+            order=order,
+            period=new.period,
+            speed=recovery.sigma_velocity,
+            longest=recovery.after,
+            floor=(max(quantum / 12.0**0.5, 1e-9), 1e-9),
+        )
+    motion = Motion(order, 1, np.array([figures.process**2]), by_axis(1), 2, new.period)
     unit = new.name.rsplit("_", 1)[-1]
     sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
     noise = (
@@ -187,8 +205,9 @@ def _settle(
     return state._replace(
         motion=motion,
         recovery=recovery,
+        prior=prior,
         lag=float(options.lag_s or _LAG_VALUES * interval),
         sigma=sigma,
         noise=noise,
-        filter=start(motion, recovery),
+        filter=begin(motion, recovery, prior),
     )

@@ -19,11 +19,11 @@ from surefix.cleaning.duplicates import (
     start_repeats,
 )
 from surefix.errors import InputError
-from surefix.filters.records import TrackState
-from surefix.filters.track import start
 from surefix.pipelines.channels import CHANNEL_HEAD, ChannelState, clean_channel
 from surefix.pipelines.joining import join
 from surefix.pipelines.judge import (
+    FilterState,
+    begin,
     estimate,
     join_status,
     jump_events,
@@ -65,7 +65,7 @@ class _Session:
     setup: Setup | None = None
     idle: BoolArray | None = None
     repeats: RepeatState | None = None
-    filter: TrackState | None = None
+    filter: FilterState | None = None
     last_tau: float = -np.inf
     next_grid: int | None = None
     channels: dict[tuple[str, str], ChannelState] = field(default_factory=dict)
@@ -197,7 +197,7 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
         head = _head(options)
         setup = settle(take_rows(used, head), (status.verdict < 0)[head], session.sensors, options)
         session.setup = setup
-        session.filter = start(setup.motion, setup.recovery) if setup.axes else None
+        session.filter = begin(setup.motion, setup.recovery, setup.prior) if setup.axes else None
         events += [*setup.events, *_idle_events(session)]
     position, velocity = localise(used, setup.frame, setup.origin)
     offset = padded(setup.height_offset, len(session.sensors))[rows.fixes.sensor]
@@ -215,9 +215,16 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     judged = unjudged(known)
     if session.filter is not None:
         session.filter, found = estimate(
-            options, setup.motion, setup.recovery, setup.lag, epochs, ~auxiliary, session.filter
+            options,
+            setup.motion,
+            setup.recovery,
+            setup.prior,
+            setup.lag,
+            epochs,
+            ~auxiliary,
+            session.filter,
         )
-        judged = _all_axes(verdicts(found, epochs, setup.motion, known), setup.axes)
+        judged = _all_axes(verdicts(found, epochs, setup.motion, known, setup.axes), setup.axes)
         judged = without_position(
             judged, np.concatenate([lost, np.zeros(len(grid), np.bool_)])[order]
         )

@@ -6,14 +6,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.filters.hypotheses import Bank, Prior, no_hypotheses
 from surefix.filters.modes import lagged, realtime
+from surefix.filters.multi_hypothesis_modes import (
+    lagged_hypotheses,
+    offline_hypotheses,
+    realtime_hypotheses,
+)
 from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
+from surefix.filters.track import start
 from surefix.pipelines.options import CleanOptions
 from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = [
+    "FilterState",
     "Status",
+    "begin",
     "blank_status",
     "estimate",
     "join_status",
@@ -25,6 +34,16 @@ __all__ = [
 
 _WHOLE = 0.98  # a weight from here on counts as used
 _NONE = 0.02  # a weight up to here counts as rejected
+_DOUBTFUL = 0.5  # … and a probability below this, where a weight is one
+
+
+FilterState = TrackState | Bank
+"""What a filter remembers: one hypothesis or several."""
+
+
+def begin(motion: Motion, recovery: Recovery, prior: Prior | None) -> FilterState:
+    """State of a filter that has seen nothing."""
+    return start(motion, recovery) if prior is None else no_hypotheses(motion)
 
 
 class Status(NamedTuple):
@@ -60,15 +79,24 @@ def estimate(
     options: CleanOptions,
     motion: Motion,
     recovery: Recovery,
+    prior: Prior | None,
     lag: float,
     epochs: Epochs,
     wanted: BoolArray,
-    state: TrackState,
-) -> tuple[TrackState, Estimate]:
+    state: FilterState,
+) -> tuple[FilterState, Estimate]:
     """Estimate a series in the mode the options ask for; only real time goes on from ``state``.
 
     ``wanted`` (n,) marks the epochs whose estimate becomes a row of the output.
     """
+    if prior is not None:
+        if options.mode == "lagged":
+            return state, lagged_hypotheses(motion, prior, epochs, lag, wanted)
+        if options.mode == "offline":
+            return state, offline_hypotheses(motion, prior, epochs)
+        assert isinstance(state, Bank)
+        return realtime_hypotheses(motion, prior, epochs, state)
+    assert isinstance(state, TrackState)
     if options.mode == "realtime":
         return realtime(motion, options.loss, recovery, epochs, state)
     if options.mode == "lagged":
@@ -76,7 +104,9 @@ def estimate(
     return state, offline(motion, options.loss, recovery, epochs)
 
 
-def verdicts(found: Estimate, epochs: Epochs, motion: Motion, status: Status) -> Verdicts:
+def verdicts(
+    found: Estimate, epochs: Epochs, motion: Motion, status: Status, axes: tuple[int, ...] = (0,)
+) -> Verdicts:
     """Give every row its verdict.
 
     The weight is the smallest of the position groups that were observed. A fix is rejected where
@@ -88,6 +118,8 @@ def verdicts(found: Estimate, epochs: Epochs, motion: Motion, status: Status) ->
         What the filter made of which observations.
     status
         What was known before.
+    axes
+        Which of x, y, z the filter runs on.
     """
     n, d = len(epochs.time), motion.axes
     groups = int(motion.group[:d].max()) + 1
@@ -96,18 +128,24 @@ def verdicts(found: Estimate, epochs: Epochs, motion: Motion, status: Status) ->
     smallest = _fold(np.fmin, weight)
     verdict = np.full(n, int(Verdict.USED))
     verdict[smallest < _WHOLE] = Verdict.DOWNWEIGHTED
+    several = len(found.run) > 0
     leading = weight[:, 0].copy()
     for g in range(1, groups):
-        leading = np.where(np.isnan(leading), weight[:, g], leading)
-    verdict[leading <= _NONE] = Verdict.REJECTED
+        beside = several and axes[g] < 2
+        best = np.fmax(leading, weight[:, g]) if beside else leading
+        leading = np.where(np.isnan(best), weight[:, g], best)
+    verdict[leading < _DOUBTFUL if several else leading <= _NONE] = Verdict.REJECTED
     reason = np.full(n, int(Reason.AGREES))
     reason[verdict != Verdict.USED] = Reason.OFF
     detail = np.full(n, np.nan)
     if groups > 1:
-        low = np.nan_to_num(weight, nan=1.0) < _WHOLE
+        low = np.nan_to_num(weight, nan=1.0) < (_DOUBTFUL if several else _WHOLE)
         part = low.any(axis=1) & ~low.all(axis=1) & (np.isfinite(weight).sum(axis=1) > 1)
         reason[part] = Reason.AXIS_OFF
-        detail[part] = (low[part] * (1 << np.arange(groups))).sum(axis=1)
+        detail[part] = (low[part] * _bits(axes, several)).sum(axis=1)
+    if several:
+        run = (found.run > 0) & (verdict == Verdict.REJECTED)
+        reason[run], detail[run] = Reason.RUN, found.run[run]
     since = found.since[:, :groups]
     jumped = np.isfinite(since).any(axis=1)
     reason[jumped & (verdict != Verdict.REJECTED)] = Reason.JUMP
@@ -125,6 +163,14 @@ def verdicts(found: Estimate, epochs: Epochs, motion: Motion, status: Status) ->
         reason.astype(np.int64),
         detail,
     )
+
+
+def _bits(axes: tuple[int, ...], several: bool) -> IntArray:
+    """Bits of `Reason.AXIS_OFF` for each group: blocks or single axes, but for both the same."""
+    if several:
+        return np.array([1 << axis for axis in axes])
+    kinds = list(dict.fromkeys(axis == 2 for axis in axes))
+    return np.array([4 if kind else 3 for kind in kinds])
 
 
 def _fold(function: np.ufunc, columns: FloatArray) -> FloatArray:

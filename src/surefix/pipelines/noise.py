@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.filters.hypotheses import Prior
+from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
-from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
 from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
 from surefix.types import FloatArray, Noise
 
@@ -31,8 +33,8 @@ class Figures(NamedTuple):
         (axes,) spectral density of the process noise.
     noise
         The same for people.
-    cost
-        Negative log-likelihood.
+    prior
+        What a multi-hypothesis filter supposes; None for another method.
     """
 
     model: str
@@ -40,7 +42,18 @@ class Figures(NamedTuple):
     velocity: FloatArray
     density: FloatArray
     noise: tuple[Noise, ...]
-    cost: float
+    prior: Prior | None
+
+
+class _Block(NamedTuple):
+    """Axes that share their figures: the horizontal ones, or the vertical one."""
+
+    axes: list[int]
+    observations: Observations
+    given: NoiseFigures
+    floor: tuple[float, float]
+    found: NoiseFigures
+    prior: Prior | None = None
 
 
 def settle_noise(
@@ -50,6 +63,8 @@ def settle_noise(
     axes: tuple[int, ...],
     sensors: list[str],
     options: CleanOptions,
+    speed: float,
+    longest: float,
 ) -> Figures:
     """Give the noise of every sensor, under the likeliest of the motion models to choose from.
 
@@ -63,14 +78,33 @@ def settle_noise(
         Which of x, y, z are observed.
     sensors, options
         Names of the sensors; figures given by the user.
+    speed
+        Standard deviation of a velocity nothing is known about, m/s.
+    longest
+        Longest run of wrong fixes to be survived, s.
     """
-    tried = [
-        _under(model, rows, position, velocity, axes, sensors, options) for model in options.models
-    ]
-    return min(tried, key=lambda figures: figures.cost)
+    tried = {
+        model: _blocks(model, rows, position, velocity, axes, sensors, options)
+        for model in options.models
+    }
+    model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
+    blocks = tried[model]
+    if options.method == MULTI_HYPOTHESIS:
+        blocks = [_learnt(block, model, speed, longest) for block in blocks]
+    sigma_position = np.full((len(sensors), 3), np.nan)
+    sigma_velocity = np.full((len(sensors), 3), np.nan)
+    density = np.zeros(len(axes))
+    noise: list[Noise] = []
+    for block in blocks:
+        sigma_position[:, block.axes] = block.found.position[:, None]
+        sigma_velocity[:, block.axes] = block.found.velocity[:, None]
+        density[[axes.index(i) for i in block.axes]] = block.found.process**2
+        noise += _named(block, sensors, model)
+    prior = _joined(blocks, axes)
+    return Figures(model, sigma_position, sigma_velocity, density, tuple(noise), prior)
 
 
-def _under(
+def _blocks(
     model: str,
     rows: Rows,
     position: FloatArray,
@@ -78,11 +112,9 @@ def _under(
     axes: tuple[int, ...],
     sensors: list[str],
     options: CleanOptions,
-) -> Figures:
-    sigma_position = np.full((len(sensors), 3), np.nan)
-    sigma_velocity = np.full((len(sensors), 3), np.nan)
-    density, cost = np.zeros(len(axes)), 0.0
-    noise: list[Noise] = []
+) -> list[_Block]:
+    """Figures of the horizontal and of the vertical axes under one motion model."""
+    out = []
     for vertical in (False, True):
         block = [i for i in axes if (i == 2) == vertical]
         if not block:
@@ -96,19 +128,49 @@ def _under(
             rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
         )
         given = _given(options, sensors, rows, vertical)
+        quantum = _quantum(rows, block), _velocity_quantum(velocity, block)
         found = estimate_noise(
             observations,
             given,
             order=MODELS[model],
-            quantum=_quantum(rows, block),
-            velocity_quantum=_velocity_quantum(velocity, block),
+            quantum=quantum[0],
+            velocity_quantum=quantum[1],
         )
-        sigma_position[:, block] = found.position[:, None]
-        sigma_velocity[:, block] = found.velocity[:, None]
-        density[[axes.index(i) for i in block]] = found.process**2
-        cost += found.cost
-        noise += _named(found, given, sensors, vertical, model, observations)
-    return Figures(model, sigma_position, sigma_velocity, density, tuple(noise), cost)
+        floor = (max(quantum[0] / 12.0**0.5, 1e-9), max(quantum[1] / 12.0**0.5, 1e-9))
+        out.append(_Block(block, observations, given, floor, found))
+    return out
+
+
+def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:
+    """Let the figures of a block follow from what belongs to the track."""
+    learnt = learn(
+        block.observations,
+        block.given,
+        block.found,
+        order=MODELS[model],
+        period=0.0,
+        speed=speed,
+        longest=longest,
+        floor=block.floor,
+    )
+    return block._replace(found=learnt.figures, prior=learnt.prior)
+
+
+def _joined(blocks: list[_Block], axes: tuple[int, ...]) -> Prior | None:
+    """One prior for all axes: that of the first block, with the scales of each."""
+    priors = [block.prior for block in blocks if block.prior is not None]
+    if not priors:
+        return None
+    d, first, last = len(axes), priors[0], priors[-1]
+    spread = np.ones(2 * d)
+    for block in blocks:
+        assert block.prior is not None
+        own = len(block.axes)
+        for j, i in enumerate(block.axes):
+            at = axes.index(i)
+            spread[at], spread[d + at] = block.prior.spread[j], block.prior.spread[own + j]
+    alone = last.isolated - first.isolated if last is not first else 0.0
+    return first._replace(partial=max(first.partial, alone), spread=spread)
 
 
 def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:
@@ -153,14 +215,10 @@ def _velocity_quantum(velocity: FloatArray, block: list[int]) -> float:
     )
 
 
-def _named(
-    found: NoiseFigures,
-    given: NoiseFigures,
-    sensors: list[str],
-    vertical: bool,
-    model: str,
-    observations: Observations,
-) -> list[Noise]:
+def _named(block: _Block, sensors: list[str], model: str) -> list[Noise]:
+    """The figures of a block for people."""
+    observations, found, given = block.observations, block.found, block.given
+    vertical = block.axes == [2]
     axes = observations.z.shape[1] // 2
     words = ("height", "vertical velocity") if vertical else ("position", "velocity")
     out = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.cleaning.duplicates import Repeats
+from surefix.filters.hypotheses import MOST_SENSORS
 from surefix.filters.records import Epochs
 from surefix.pipelines.judge import Status, blank_status
 from surefix.pipelines.rows import Rows
@@ -124,7 +125,9 @@ def epochs_of(
         fixed = np.vstack([fixed, np.full((len(grid), motion.groups), np.nan)])
     order = np.argsort(tau, kind="stable") if len(grid) else np.arange(n)
     jump = np.zeros(len(order), np.int64)
-    return order, Epochs(tau[order], z[order], sigma[order] ** 2, fixed[order], jump)
+    sensor = np.concatenate([rows.fixes.sensor, np.zeros(len(grid), np.int64)])[order]
+    sensor = np.minimum(sensor, MOST_SENSORS - 1)
+    return order, Epochs(tau[order], z[order], sigma[order] ** 2, fixed[order], jump, sensor)
 
 
 def _sigma(declared: FloatArray, figures: FloatArray, sensors: int, sensor: IntArray) -> FloatArray:

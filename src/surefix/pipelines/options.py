@@ -12,9 +12,13 @@ from surefix.errors import OptionsError
 from surefix.models.motion import MODELS
 from surefix.robust.loss import LOSSES, Loss, loss_named
 
-__all__ = ["CleanOptions", "Mode", "options_from"]
+__all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Mode", "options_from"]
 
 Mode = Literal["realtime", "lagged", "offline"]
+
+MULTI_HYPOTHESIS = "multi-hypothesis"
+METHODS = (MULTI_HYPOTHESIS, *LOSSES)
+"""Names of the estimators: several hypotheses, or one with a robust loss."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +31,7 @@ class CleanOptions:
         ``realtime``: each fix is judged and estimated from the past alone. ``lagged``: from the
         past and ``lag_s`` seconds of future. ``offline``: from the whole log.
     method
-        The robust loss, one of `surefix.robust.loss.LOSSES`.
+        The estimator, one of ``METHODS``: several hypotheses, or one with a robust loss.
     model
         Motion model: ``cv`` constant velocity, ``ca`` constant acceleration, ``auto`` the likelier
         of the two (``cv`` if ``process`` is given, for their units differ).
@@ -39,8 +43,9 @@ class CleanOptions:
         Seconds of future in the lagged mode; default 20 intervals between fixes.
     recovery_s
         Seconds of unbroken rejection after which a track believes its sensor again; default 30
-        intervals between fixes. No loss locks out for longer. Runs of errors may be followed
-        sooner where only fixes support the track, for its own uncertainty grows meanwhile.
+        intervals between fixes, 40 with several hypotheses. No method locks out for longer. With
+        several hypotheses it is the longest run of wrong fixes that is survived; with a loss runs
+        may be followed sooner, where only fixes support the track.
     sigma_position, sigma_height, sigma_velocity
         Noise of the fixes: horizontal m, vertical m, velocity m/s.
     sensor_sigma
@@ -78,7 +83,7 @@ class CleanOptions:
 
     def __post_init__(self) -> None:
         _one_of("mode", self.mode, get_args(Mode))
-        _one_of("method", self.method, LOSSES)
+        _one_of("method", self.method, METHODS)
         _one_of("model", self.model, (*MODELS, "auto"))
         for name in _POSITIVE:
             _positive(name, getattr(self, name))
@@ -94,7 +99,10 @@ class CleanOptions:
                 _number(name, getattr(self, name))
         if self.lag_s is not None and self.mode != "lagged":
             raise OptionsError(f"a lag in mode {self.mode}", "mode lagged")
-        if self.method in ("kalman", "gate") and (self.k0, self.k1) != (None, None):
+        if self.method in ("kalman", "gate", MULTI_HYPOTHESIS) and (self.k0, self.k1) != (
+            None,
+            None,
+        ):
             raise OptionsError(f"k0 or k1 with method {self.method}", "a method that has them")
         _number("false_alarm", self.false_alarm)
         if _number("reorder_s", self.reorder_s) < 0.0:
@@ -105,7 +113,9 @@ class CleanOptions:
 
     @property
     def loss(self) -> Loss:
-        """The robust loss these options ask for."""
+        """The robust loss these options ask for; none for several hypotheses."""
+        if self.method == MULTI_HYPOTHESIS:
+            return loss_named("kalman")
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
 
     @property

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from surefix.errors import OptionsError
+from surefix.filters.hypotheses import Prior
 from surefix.filters.noise import speed_scale
 from surefix.filters.records import Motion, Recovery
-from surefix.filters.track import by_block
+from surefix.filters.track import by_axis, by_block
 from surefix.geo.local_frame import LocalFrame, origin_of, rotate
 from surefix.models.motion import MODELS
 from surefix.pipelines.noise import settle_noise
-from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
 from surefix.pipelines.rows import Rows
 from surefix.types import BoolArray, Event, FloatArray, Noise
 
@@ -23,6 +24,7 @@ FARTHEST = 1e9
 """m: what lies beyond is as wild as what lies there, and its square is finite."""
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
+_RUN_FIXES = 40  # longest run of wrong fixes that several hypotheses survive
 _FEW_HEIGHTS = 3  # heights that show an offset
 _ANOTHER_DEPTH = 200.0  # m: a depth that differs more is not the vehicle's
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
@@ -41,7 +43,10 @@ class Setup:
     axes
         Which of x, y, z are observed.
     motion, model, recovery
-        Of the filter; the groups are horizontal and vertical blocks. The motion model by its name.
+        Of the filter. Groups are horizontal and vertical blocks, single axes with several
+        hypotheses. The motion model by its name.
+    prior
+        Of several hypotheses; None for a loss.
     interval
         Median interval between fixes, s.
     lag
@@ -60,6 +65,7 @@ class Setup:
     motion: Motion
     model: str
     recovery: Recovery
+    prior: Prior | None
     interval: float
     lag: float
     position: FloatArray
@@ -111,10 +117,11 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
     position[:, 2] -= np.where(rows.auxiliary, 0.0, offset[rows.fixes.sensor])
     axes = tuple(i for i in range(3) if np.isfinite(position[:, i]).any())
     interval = _interval(rows, position)
-    figures = settle_noise(rows, position, velocity, axes, sensors, options)
-    group = by_block(axes)
-    speeds = [_speed(rows, position, i) for i in axes]
-    after = options.recovery_s or _RECOVERY_FIXES * interval
+    several = options.method == MULTI_HYPOTHESIS
+    after = float(options.recovery_s or (_RUN_FIXES if several else _RECOVERY_FIXES) * interval)
+    speed = max([*(_speed(rows, position, i) for i in axes), 1e-3])
+    figures = settle_noise(rows, position, velocity, axes, sensors, options, speed, after)
+    group = by_axis(len(axes)) if several else by_block(axes)
     return Setup(
         frame=frame,
         origin=origin,
@@ -128,7 +135,8 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
             0.0,
         ),
         model=figures.model,
-        recovery=Recovery(float(after), max([*speeds, 1e-3])),
+        recovery=Recovery(after, speed),
+        prior=figures.prior,
         interval=interval,
         lag=float(options.lag_s or _LAG_FIXES * interval),
         position=figures.position,
