@@ -72,7 +72,8 @@ def _logged(log: ShipLog, key: str, title: str, shown: Mapping[str, str], unit: 
     for quantity, label in shown.items():
         sensor = log.sensor("INS", quantity)
         kind = "raw" if quantity == "heading" else "line"  # a line would cross the seam at north
-        trace = thinned("INS, as logged", _hours(log), unit * sensor.value, kind)
+        points = _POINTS // 2 if kind == "raw" else _POINTS
+        trace = thinned("INS, as logged", _hours(log), unit * sensor.value, kind, points)
         panels.append(Panel(x_label="time, h", y_label=label, traces=(trace,)))
     return Figure(key=key, title=title, panels=tuple(panels), columns=2 if len(panels) == 2 else 1)
 
@@ -84,19 +85,17 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> 
     first, last = _stretch(sensor.faults.burst)
     near, second = slice(first, last), np.arange(first, last, dtype=np.float64)
     label = f"{'east' if quantity == 'v_east' else 'north'} velocity, m/s"
-    low, high = np.nanmin(sensor.intact[near]), np.nanmax(sensor.intact[near])
     panels = []
     for name in (*FIGURES_SHOW, *more):
         cleaned = METHODS[name](given).value
         panels += [
             Panel(
                 title=name, x_label="time, h", y_label=label,
-                traces=(thinned(name, hours, cleaned),),
+                traces=(thinned(name, hours, cleaned, points=500),),
             ),
             Panel(
                 title="a stretch of it",
                 x_label="time, s", y_label=label,
-                y_range=(float(low) - 6.0, float(high) + 6.0),
                 traces=(
                     Trace(_LOGGED, second, given.value[near], "raw"),
                     Trace("without faults", second, sensor.intact[near],
@@ -109,8 +108,8 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> 
 
 
 def _stretch(burst: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[int, int]:
-    """Rows of about five minutes with as many bursts as can be, of different lengths."""
-    n, width = len(burst), min(320, len(burst))
+    """Rows of about three minutes with as many bursts as can be, of different lengths."""
+    n, width = len(burst), min(200, len(burst))
     starts = np.arange(0, n - width + 1, 20)
     bursts = np.diff((burst > 0).astype(np.int64), prepend=0) > 0
     rich = [
@@ -122,19 +121,22 @@ def _stretch(burst: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[int, in
 
 
 def _bursts(removed: Mapping[str, list[float]]) -> Figure:
-    shown = (
-        *FIGURES_SHOW, "Lagrange, 3 points", "Hampel, 11 samples", "Hampel, 61 samples", OURS
-    )  # fmt: skip
-    at = np.arange(len(BURSTS), dtype=np.float64)
-    lines = tuple(Trace(name, at, np.array(removed[name]), "points") for name in shown)
-    lengths = ", ".join(str(length) for length in BURSTS)
-    panel = Panel(
-        x_label=f"length of the burst: {lengths} samples",
-        y_label="removed, %",
-        y_range=(-4.0, 104.0),
-        traces=lines,
+    at = np.array(BURSTS, dtype=np.float64)
+    panels = tuple(
+        Panel(
+            title=title,
+            x_label="length of the burst, samples",
+            y_label="removed, %",
+            y_range=(-4.0, 104.0),
+            traces=tuple(Trace(name, at, np.array(removed[name]), "points") for name in names),
+        )
+        for title, names in (
+            ("methods that the paper names", (*FIGURES_SHOW, "Lagrange, 3 points")),
+            ("others", ("Hampel, 61 samples", OURS)),
+        )
     )
-    return Figure(key="bursts", title="Gross errors removed, by length of burst", panels=(panel,))
+    title = "Gross errors removed, by length of burst"
+    return Figure(key="bursts", title=title, panels=panels, columns=2)
 
 
 def _record(log: ShipLog, record: Integrated) -> Figure:
@@ -180,7 +182,7 @@ def _panel(label: str, reach: float, hours: FloatArray, errors: dict[str, FloatA
         y_label=f"error of {label}",
         y_range=(-reach, reach),
         traces=tuple(
-            thinned(name, hours, np.clip(error, -3.0 * reach, 3.0 * reach), points=900)
+            thinned(name, hours, np.clip(error, -3.0 * reach, 3.0 * reach), points=600)
             for name, error in errors.items()
         ),
     )

@@ -76,12 +76,13 @@ def integrate(streams: Sequence[Stream], options: ShipOptions) -> Integrated:
     Raises
     ------
     OptionsError
-        No samples with a time at all, or a latitude without its longitude.
+        No samples with a time at all, or a latitude and a longitude that do not belong together.
     """
     times = [stream.time[np.isfinite(stream.time)] for stream in streams]
     known = [time for time in times if time.size]
     if not known:
         raise OptionsError("no samples with a time", "at least one stream that has some")
+    _check_positions(streams)
     latitude = _joined(streams, "latitude")
     cleaned = tuple(clean_stream(stream, latitude, options) for stream in streams)
     first, last = min(time[0] for time in known), max(time[-1] for time in known)
@@ -111,6 +112,14 @@ def integrate(streams: Sequence[Stream], options: ShipOptions) -> Integrated:
     )
 
 
+def _check_positions(streams: Sequence[Stream]) -> None:
+    sizes = {(s.sensor, s.quantity): len(s.value) for s in streams}
+    for (sensor, quantity), size in sizes.items():
+        pair = {"latitude": "longitude", "longitude": "latitude"}.get(quantity)
+        if pair is not None and sizes.get((sensor, pair)) != size:
+            raise OptionsError(f"{sensor} has {size} of {quantity}", f"as many of {pair}")
+
+
 def _joined(streams: Sequence[Stream], quantity: str) -> FloatArray:
     values = [s.value for s in streams if s.quantity == quantity]
     return np.concatenate(values) if values else np.empty(0)
@@ -124,23 +133,21 @@ def _columns(cleaned: Sequence[CleanStream], frame: LocalFrame) -> dict[str, lis
     """Samples by quantity of the record; positions in the local frame."""
     columns: dict[str, list[_Column]] = {"east": [], "north": []}
     columns |= {"speed": [], "heading": [], "depth": []}
-    velocities: dict[tuple[str, str], CleanStream] = {}
+    by_name: dict[tuple[str, str], CleanStream] = {}
     for each in cleaned:
         sensor, quantity = each.stream.sensor, each.stream.quantity
         if quantity in ("speed", "heading", "depth"):
             columns[quantity].append(_Column(sensor, each.stream.time, each.value, each.sigma))
-        velocities[sensor, quantity] = each
-    for (sensor, quantity), each in velocities.items():
+        by_name[sensor, quantity] = each
+    for (sensor, quantity), each in by_name.items():
         if quantity == "latitude":
-            other = velocities.get((sensor, "longitude"))
-            if other is None or len(other.value) != len(each.value):
-                raise OptionsError(f"{sensor} has a latitude alone", "its longitude as well")
+            other = by_name[sensor, "longitude"]
             x, y, _ = frame.to_local(np.degrees(each.value), np.degrees(other.value))
             across = _RADIUS * np.cos(np.radians(frame.latitude_deg))
             columns["east"].append(_Column(sensor, each.stream.time, x, across * other.sigma))
             columns["north"].append(_Column(sensor, each.stream.time, y, _RADIUS * each.sigma))
-        if quantity == "v_east" and (sensor, "v_north") in velocities:
-            other = velocities[sensor, "v_north"]
+        if quantity == "v_east" and (sensor, "v_north") in by_name:
+            other = by_name[sensor, "v_north"]
             sigma = np.sqrt(0.5 * (each.sigma**2 + other.sigma**2))
             speed = np.hypot(each.value, other.value)
             columns["speed"].append(_Column(sensor, each.stream.time, speed, sigma))

@@ -19,6 +19,7 @@ __all__ = ["CleanStream", "Stream", "clean_stream", "resolution"]
 
 _WHITE = 0.6898  # robust scale of x − x₃ over that of x, where x is white normal noise
 _REPEATING = 0.05  # share of repeated values from which digits are coarse
+_LEAST_SIGMA = 0.01  # of the threshold: noise of a series that never changes
 _HALF_PI = 0.5 * np.pi
 _RANGES = {
     "latitude": (-_HALF_PI, _HALF_PI),
@@ -114,7 +115,7 @@ def clean_stream(stream: Stream, latitude: FloatArray, options: ShipOptions) -> 
     samples = max(round(options.evaluation_s / _median_step(time)), 5)
     sigma = rolling_scale(kept, samples) / _WHITE
     sigma = np.fmax(sigma, resolution(stream.value) / np.sqrt(12.0))
-    sigma = np.where(sigma > 0.0, sigma, np.nan)
+    sigma = np.where(sigma == 0.0, _LEAST_SIGMA * limit, sigma)
     off = _difference(stream.value, cleaned.estimate, period)
     return CleanStream(
         stream,

@@ -23,12 +23,13 @@ import numpy as np
 from surefix.cleaning.hampel import MAD_TO_SIGMA
 from surefix.cleaning.running_median import running_median
 from surefix.geo.angle import wrap
-from surefix.jit import kernel
+from surefix.jit import helper, kernel
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["Aligned", "Fused", "Quality", "align", "fuse"]
 
 _FORGET = 0.02  # per epoch, of how far predictions were off
+_LEARNT = 10  # epochs after which a prediction may be held against a sensor
 _MEDIAN_LOSS = 0.5 * np.pi  # variance of a median over that of a mean, normal noise
 
 
@@ -85,9 +86,9 @@ def align(
 ) -> Aligned:
     """Remove from each sensor its offset from the first one.
 
-    The offset now is extrapolated from two running medians b, one window apart, of the differences:
-    b(k) + (b(k) − b(k−W))/W · (W/2 + age), where age counts from the last comparison. Without it an
-    INS that drifts would lag by half a window of its drift. A window holds the last W differences
+    The offset now is extrapolated from running medians of the differences, b, and of their epochs,
+    m: b(k) + (b(k) − b(k−W))/(m(k) − m(k−W)) · (now − m(k)), exact for an offset that changes
+    steadily; the median alone would lag by half a window. A window holds the last W differences
     there were, however old: wrong ones among them stay the minority through an interruption.
 
     Parameters
@@ -99,7 +100,8 @@ def align(
     window
         W, differences.
     drift
-        Further growth of the offset's standard deviation, per second of age.
+        Growth of the offset's standard deviation, per second that the differences are older than
+        they would be without an interruption.
     period
         One turn for angles, else 0.
     """
@@ -113,18 +115,22 @@ def align(
             continue
         seen = difference[at]
         median = running_median(seen, window, centred=False)
+        middle = running_median(at.astype(np.float64), window, centred=False)
         early = np.maximum(np.arange(at.size) - window, 0)
-        rate = (median - median[early]) / np.maximum(at - at[early], 1)
+        rate = (median - median[early]) / np.maximum(middle - middle[early], 1.0)
         rate[:window] = 0.0
-        now = median + 0.5 * rate * (at - at[np.minimum(early + 1, at.size - 1)])
+        now = median + rate * (at - middle)
         scale = MAD_TO_SIGMA * running_median(np.abs(seen - now), window, centred=False)
         latest = np.searchsorted(at, np.arange(n), side="right") - 1
         known = latest >= 0
-        age = np.where(known, np.arange(n) - at[latest], 0)
-        offset[:, s] = np.where(known, now[latest] + rate[latest] * age, 0.0)
+        later = np.where(known, np.arange(n) - at[latest], 0)
+        offset[:, s] = np.where(known, now[latest] + rate[latest] * later, 0.0)
+        age = np.where(known, np.arange(n) - middle[latest] - 0.5 * (window - 1), 0.0)
         spread = np.where(known, scale[latest], 0.0) ** 2
         agreement = np.maximum(agreement, spread)
-        variance[:, s] += 2.5 * _MEDIAN_LOSS * spread / window + (drift * step * age) ** 2
+        variance[:, s] += (
+            2.5 * _MEDIAN_LOSS * spread / window + (drift * step * np.maximum(age, 0.0)) ** 2
+        )
     return Aligned(value - offset, offset, variance, agreement)
 
 
@@ -154,9 +160,11 @@ def fuse(
     )
     known = np.isfinite(aligned.value) & (aligned.variance > 0.0)
     z = np.where(known, aligned.value, np.nan)
-    gates = gate * gate * (aligned.variance + aligned.agreement[:, None])
     keep = float(np.exp(-step / fade_s))
-    _combine(z, aligned.offset, aligned.variance, gates, gate, period, keep, fade_s / step, *fused)
+    _combine(
+        z, aligned.offset, aligned.variance, aligned.agreement, gate * gate, period, keep,
+        fade_s / step, *fused,
+    )  # fmt: skip
     total = np.sqrt(fused.sigma**2 + systematic**2)
     value = np.mod(fused.value, period) if period else fused.value
     return Fused(value, total, fused.sources, fused.quality)
@@ -167,8 +175,8 @@ def _combine(
     z: FloatArray,
     offset: FloatArray,
     variance: FloatArray,
-    gates: FloatArray,
-    gate: float,
+    agreement: FloatArray,
+    gate2: float,
     period: float,
     keep: float,
     patience: float,
@@ -180,14 +188,14 @@ def _combine(
     """Fill ``y``, ``sigma``, ``sources`` and ``quality``; ``patience`` epochs bridge a gap."""
     n, s = z.shape
     here, before = np.full(s, np.nan), np.full(s, np.nan)
-    voters = np.empty(s + 1)
-    last, rate, carry, used, gap, missed = np.nan, 0.0, 0.0, 0, 0.0, 0.0
+    votes, doubts = np.empty(s + 1), np.empty(s + 1)
+    last, spread, rate, carry, missed, used, seen, gap = np.nan, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0
     for k in range(n):
         gap += 1.0
         if gap > patience:
-            last, rate, carry, used = np.nan, 0.0, 0.0, 0
+            last, rate, carry, missed, used, seen = np.nan, 0.0, 0.0, 0.0, 0, 0
         expected = last + rate * gap  # of the mean; y is the mean and what is carried over
-        count, reference = 0, expected
+        present, reference = 0, expected
         for i in range(s):
             here[i] = z[k, i]
             if np.isnan(here[i]):
@@ -196,38 +204,42 @@ def _combine(
                 here[i] -= period * np.floor((here[i] - reference) / period + 0.5)
             if np.isnan(reference):
                 reference = here[i]
-            voters[count] = here[i]
-            count += 1
-        if count == 0:
+            _vote(votes, doubts, present, here[i], variance[k, i])
+            present += 1
+        if present == 0:
             continue
-        present = count
-        if not np.isnan(expected):
-            voters[count] = expected
+        count = present
+        if seen >= _LEARNT:
+            _vote(votes, doubts, count, expected, spread + missed)
             count += 1
-        alone = present == 1 and count == 2
-        centre = expected if alone else np.median(voters[:count])
-        weight, total, chosen, dropped = 0.0, 0.0, 0, 0
+        low, high = (count - 1) // 2, count // 2
+        centre, doubt = 0.5 * (votes[low] + votes[high]), max(doubts[low], doubts[high])
+        if present == 1 and count == 2:
+            centre, doubt = expected, spread + missed
+        weight, total, chosen, dropped, best = 0.0, 0.0, 0, 0, -1
         for i in range(s):
             off = here[i] - centre
             if np.isnan(off):
                 continue
-            if off * off > gates[k, i] + (gate * gate * missed if alone else 0.0):
+            if best < 0 or abs(off) < abs(here[best] - centre):
+                best = i
+            if count > 1 and off * off > gate2 * (variance[k, i] + agreement[k] + doubt):
                 dropped += 1
                 continue
             weight += 1.0 / variance[k, i]
             total += here[i] / variance[k, i]
             chosen |= 1 << i
         if chosen == 0:
-            best = -1
-            for i in range(s):
-                nearer = best < 0 or abs(here[i] - centre) < abs(here[best] - centre)
-                if not np.isnan(here[i]) and nearer:
-                    best = i
-            weight = 1.0 / variance[k, best]
-            total = here[best] * weight
+            weight, total = 1.0 / variance[k, best], here[best] / variance[k, best]
             chosen = 1 << best
         mean = total / weight
         changed = chosen != used or gap > 1.0 or dropped == present
+        if not np.isnan(last):
+            seen += 1
+            off2 = (mean - expected) ** 2
+            if seen > _LEARNT:  # jumps count as 3σ at most
+                off2 = min(off2, 9.0 * (missed + 1.0 / weight))
+            missed += max(_FORGET, 1.0 / seen) * (off2 - missed)
         if not np.isnan(last) and changed:
             moved, shared = 0.0, 0.0
             for i in range(s):
@@ -239,15 +251,22 @@ def _combine(
                     moved += step / variance[k, i]
                     shared += 1.0 / variance[k, i]
             carry += (last + moved / shared if shared > 0.0 else expected) - mean
-        if not np.isnan(last):  # how far the prediction is off, jumps clipped to 3σ
-            off2 = (mean - expected) ** 2
-            missed += _FORGET * (min(off2, 9.0 * (missed + 1.0 / weight)) - missed)
         if not np.isnan(last) and not changed:
-            rate += 0.1 * ((mean - last) / gap - rate)
+            rate += max(0.1, 1.0 / seen) * ((mean - last) / gap - rate)
             carry *= keep
         y[k] = mean + carry
         sigma[k] = np.sqrt(1.0 / weight + carry * carry)
         sources[k] = chosen
         quality[k] = 1 if dropped > 0 or carry * carry * weight > 1.0 else 0
-        last, used, gap = mean, chosen, 0.0
+        last, spread, used, gap = mean, 1.0 / weight, chosen, 0.0
         before[:] = here + offset[k]
+
+
+@helper
+def _vote(votes: FloatArray, doubts: FloatArray, count: int, value: float, variance: float) -> None:
+    """Insert a value and its variance into the first ``count`` votes, which rise."""
+    place = count
+    while place > 0 and votes[place - 1] > value:
+        votes[place], doubts[place] = votes[place - 1], doubts[place - 1]
+        place -= 1
+    votes[place], doubts[place] = value, variance

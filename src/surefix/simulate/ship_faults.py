@@ -101,7 +101,8 @@ def disturbed(
     lost |= gone
     burst[lost] = 0
     value[lost] = np.nan
-    return Disturbed(value, ~invalid, Faults(burst, stuck & ~lost, lost, invalid & ~lost))
+    invalid &= ~lost
+    return Disturbed(value, ~invalid, Faults(burst, stuck & ~lost, lost, invalid))
 
 
 def _runs(n: int, share: float, lengths: tuple[int, ...]) -> list[int]:
