@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer.exceptions import TyperException
 
+from surefix.cli_compare import compare
+from surefix.cli_experiment import JsonFile, Report, Seed, check_report, tell
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
 
@@ -162,8 +164,7 @@ def clean(
             "every_s": _seconds("--every", every),
         },
     )
-    if report is not None:
-        _check_report(report)
+    check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
     _keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with over_bytes(files, quiet=as_json) as told:
@@ -239,12 +240,10 @@ def reproduce(
         Literal["usbl", "cooperative", "towed", "ship", "radar"],
         typer.Argument(help="Which of the five papers.", show_default=False),
     ],
-    seed: Annotated[int, typer.Option(help="What everything is drawn from.")] = 1,
+    seed: Seed = 1,
     runs: Annotated[int, typer.Option(help="Number of independent repetitions.")] = 20,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
-    ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+    json_file: JsonFile = None,
+    report: Report = None,
     log: Annotated[
         list[Path] | None,
         typer.Option(help="With ship: a recorded log instead of simulated ones; repeatable."),
@@ -252,23 +251,15 @@ def reproduce(
 ) -> None:
     """Run a paper's experiment again: its methods, its baselines, and the printed figures."""
     from surefix.papers.reproduce import reproduce as run
-    from surefix.papers.reproduce import text_lines, write_json
 
-    if report is not None:
-        _check_report(report)
+    check_report(report)
     _keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
     with over_runs(runs) as told:
         experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)
-    for line in text_lines(experiment):
-        typer.echo(line)
-    if json_file is not None:
-        write_json(experiment, json_file)
-        typer.echo(f"wrote {json_file}")
-    if report is not None:
-        from surefix.report.experiment import write_experiment
+    tell(experiment, experiment, json_file, report)
 
-        write_experiment(experiment, report)
-        typer.echo(f"wrote {report}")
+
+app.command()(compare)
 
 
 def main() -> None:
@@ -345,15 +336,6 @@ def _keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
     for path in outputs:
         if path.resolve() in read:
             raise OptionsError(f"output {path} is also an input", "another name")
-
-
-def _check_report(path: Path) -> None:
-    """Refuse a report that cannot be written before the work is done."""
-    from surefix.report.shell import check_extra
-
-    check_extra()
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise OptionsError(f"--report {path}", "a name that ends in .html")
 
 
 def _print(found: dict[str, Any], text: list[str], as_json: bool) -> None:

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from surefix.comparison.merit import Outcomes
+from surefix.comparison.merit import ORACLE, Outcomes
 from surefix.comparison.options import CompareOptions, world_of
-from surefix.comparison.oracle import oracle
 from surefix.comparison.tables import KIND_WORDS, MODE_WORDS
 from surefix.experiment import Figure, Panel, Table, Trace
 from surefix.pipelines.options import Mode
@@ -50,7 +49,7 @@ def _ratios(mode: Mode, tables: Mapping[str, Table]) -> Figure:
                 x_label="",
                 y_label="RMSE ÷ oracle",
                 traces=(
-                    Trace("oracle", _places(table), np.ones(len(table.rows)), "truth"),
+                    Trace(ORACLE, _places(table), np.ones(len(table.rows)), "truth"),
                     *(
                         Trace(method, _places(table), table.mean[:, i], "points")
                         for i, method in enumerate(table.columns)
@@ -79,9 +78,10 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
     bad = wrong > 0.0
     panels = []
     for mode in options.modes:
-        off = oracle(trial, mode).position - trial.position
-        lines = {"oracle": np.sqrt((off**2).sum(axis=1))}
-        lines |= {method: first[scenario][kind, mode, method].error for method in options.methods}
+        lines = {
+            method: first[scenario][kind, mode, method].error
+            for method in (ORACLE, *options.methods)
+        }
         panels.append(
             Panel(
                 title=MODE_WORDS[mode],
@@ -90,7 +90,7 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
                 traces=(
                     Trace("gross error of the fix", trial.time[bad], wrong[bad], "bad"),
                     *(
-                        Trace(name, trial.time, error, "truth" if name == "oracle" else "line")
+                        Trace(name, trial.time, error, "truth" if name == ORACLE else "line")
                         for name, error in lines.items()
                     ),
                 ),

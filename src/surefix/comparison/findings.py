@@ -37,12 +37,12 @@ def _sentence(method: str, mode: Mode, tables: Mapping[str, Table]) -> str:
     honest = list(_of("nees", method, mode, tables).values())
     gross = list(_of("rejected_gross_pct", method, mode, tables).values())
     good = list(_of("rejected_good_pct", method, mode, tables).values())
-    rejected = f"; rejects at least {min(gross):.1f} % of the gross errors" if gross else ""
+    wild = f"{min(gross):.1f} % of the gross errors at least, and " if gross else ""
     return (
         f"{method}, {MODE_WORDS[mode]}: RMSE ÷ oracle {np.median(list(ratios.values())):.2f} in the"
         f" median, at worst {max(ratios.values()):.2f} ({scenario}, {KIND_WORDS[kind]}); NEES"
-        f" {min(honest):.2f} … {max(honest):.2f}{rejected}; of the good fixes at most"
-        f" {max(good):.1f} %."
+        f" {min(honest):.2f} … {max(honest):.2f}; rejects {wild}{max(good):.1f} % of the"
+        " good fixes at most."
     )
 
 

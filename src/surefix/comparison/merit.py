@@ -12,10 +12,13 @@ from surefix.pipelines.options import Mode
 from surefix.simulate.contamination import Trial
 from surefix.types import BoolArray, Cleaned, FloatArray, Reason, Verdict
 
-__all__ = ["GROSS_SIGMA", "Merit", "Outcome", "Outcomes", "judge"]
+__all__ = ["GROSS_SIGMA", "ORACLE", "Merit", "Outcome", "Outcomes", "judge", "judge_oracle"]
 
 GROSS_SIGMA: Final = 8.0
 """Errors of an axis that exceed it are to be rejected without exception."""
+
+ORACLE: Final = "oracle"
+"""What the oracle is called among the methods."""
 
 _BEGUN: Final = 20  # rows from which a filter in real time is judged
 _ALLOWED: Final = 60  # rows after a true jump that it is not judged on: believing takes time
@@ -41,8 +44,9 @@ class Merit(NamedTuple):
     noise_position, noise_velocity, noise_motion
         Estimated over true noise, mean over horizontal and vertical; the motion's where the true
         one is the model's.
-    back_s
-        Seconds after a true jump until the track is back beside the oracle.
+    back_fixes
+        In real time, intervals between fixes from a true jump until the track is back beside the
+        oracle.
     """
 
     rmse_ratio: float
@@ -52,7 +56,7 @@ class Merit(NamedTuple):
     noise_position: float
     noise_velocity: float
     noise_motion: float
-    back_s: float
+    back_fixes: float
 
 
 class Outcome(NamedTuple):
@@ -85,7 +89,7 @@ def judge(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Outcome:
     error = cleaned.track.position[:, :d] - trial.position
     least = best.position - trial.position
     squares = error[rows] ** 2
-    gross, good = _rejected(trial, cleaned)
+    gross, good = _rejected(trial, cleaned, rows)
     noise = _noise_ratios(trial, cleaned)
     merit = Merit(
         float(np.sqrt(squares.mean() / (least[rows] ** 2).mean())),
@@ -93,9 +97,18 @@ def judge(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Outcome:
         gross,
         good,
         *noise,
-        _back(trial, cleaned.track.position[:, :d], best),
+        _back(trial, cleaned.track.position[:, :d], best) if mode == "realtime" else np.nan,
     )
     return Outcome(merit, np.sqrt((error**2).sum(axis=1)))
+
+
+def judge_oracle(trial: Trial, best: Oracle, mode: Mode) -> Outcome:
+    """Hold the oracle against the truth: ratio 1, and how honest it is itself."""
+    rows = _judged(trial, mode)
+    error = best.position - trial.position
+    nees = float(((error[rows] / best.sigma[rows]) ** 2).mean())
+    nothing = Merit(*[np.nan] * len(Merit._fields))
+    return Outcome(nothing._replace(rmse_ratio=1.0, nees=nees), np.sqrt((error**2).sum(axis=1)))
 
 
 def _judged(trial: Trial, mode: Mode) -> BoolArray:
@@ -108,7 +121,7 @@ def _judged(trial: Trial, mode: Mode) -> BoolArray:
     return rows
 
 
-def _rejected(trial: Trial, cleaned: Cleaned) -> tuple[float, float]:
+def _rejected(trial: Trial, cleaned: Cleaned, rows: BoolArray) -> tuple[float, float]:
     """Percentages of gross errors and of good fixes that were rejected."""
     judged = cleaned.verdicts
     some = judged.reason == Reason.AXIS_OFF  # detail says which, the others were used
@@ -119,7 +132,7 @@ def _rejected(trial: Trial, cleaned: Cleaned) -> tuple[float, float]:
     every = rejected & ((wrong & ~axes[:, None]) == 0).all(axis=1)
     gross = (wrong > 0).any(axis=1)
     good = ~trial.bad_fix.any(axis=1) & np.isfinite(trial.fixes).any(axis=1)
-    return _percent(every[gross]), _percent(rejected[good])
+    return _percent(every[gross & rows]), _percent(rejected[good & rows])
 
 
 def _percent(flags: BoolArray) -> float:
@@ -146,7 +159,7 @@ def _noise_ratios(trial: Trial, cleaned: Cleaned) -> tuple[float, float, float]:
 
 
 def _back(trial: Trial, position: FloatArray, best: Oracle) -> float:
-    """Seconds from the jump until the track stays near the oracle; NaN if it never does."""
+    """Intervals from the jump until the track stays near the oracle; NaN if it never does."""
     if trial.jump < 0:
         return float("nan")
     off = np.abs(position - best.position) / best.sigma
@@ -155,4 +168,4 @@ def _back(trial: Trial, position: FloatArray, best: Oracle) -> float:
     if not stays.any():
         return float("nan")
     first = trial.jump + int(np.argmax(stays))
-    return float(trial.time[first] - trial.time[trial.jump])
+    return float(trial.time[first] - trial.time[trial.jump]) / trial.world.interval_s

@@ -45,7 +45,7 @@ class CompareOptions:
         A name nobody knows, twice the same, or a figure that is too small.
     """
 
-    methods: tuple[str, ...] = ("kalman", "igg3", "huber", "student-t")
+    methods: tuple[str, ...] = ("kalman", "huber", "student-t", "igg3", "multi-hypothesis")
     scenarios: tuple[str, ...] = tuple(SCENARIOS)
     modes: tuple[Mode, ...] = MODES
     seed: int = 1

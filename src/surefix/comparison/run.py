@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -9,7 +10,7 @@ from typing import NamedTuple
 
 from surefix.comparison.figures import figures
 from surefix.comparison.findings import findings
-from surefix.comparison.merit import Outcome, Outcomes, judge
+from surefix.comparison.merit import ORACLE, Outcome, Outcomes, judge, judge_oracle
 from surefix.comparison.options import CompareOptions, world_of
 from surefix.comparison.oracle import lag_of, oracle
 from surefix.comparison.tables import tables
@@ -70,7 +71,7 @@ def compare(options: CompareOptions, progress: Progress | None = None) -> Experi
 def outcomes(
     trial: Trial, methods: Sequence[str], modes: Sequence[Mode]
 ) -> dict[tuple[Mode, str], Outcome]:
-    """Clean one trial by several methods in several modes.
+    """Clean one trial by several methods in several modes; the oracle is added to them.
 
     Parameters
     ----------
@@ -82,6 +83,7 @@ def outcomes(
     found = {}
     for mode in modes:
         best = oracle(trial, mode)
+        found[mode, ORACLE] = judge_oracle(trial, best, mode)
         for method in methods:
             found[mode, method] = judge(trial, clean_trial(trial, method, mode), best, mode)
     return found
@@ -121,7 +123,8 @@ def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[Outcomes]:
     if jobs == 1:
         yield from map(_run, tasks)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    context, deaf = get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)  # this process will tell
+    with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=deaf) as pool:
         yield from pool.map(_run, tasks)
 
 

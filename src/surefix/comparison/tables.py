@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from surefix.comparison.merit import Merit, Outcome, Outcomes
+from surefix.comparison.merit import ORACLE, Merit, Outcome, Outcomes
 from surefix.comparison.options import CompareOptions
 from surefix.experiment import Table, gather
 from surefix.pipelines.options import Mode
@@ -25,22 +25,23 @@ KIND_WORDS: Final[Mapping[str, str]] = {"aided": "with velocities", "alone": "fi
 
 
 class _Column(NamedTuple):
-    """How one field of `Merit` is shown."""
+    """How one field of `Merit` is shown: ``once``, in the first mode, if no mode changes it."""
 
     title: str
-    unit: str
-    digits: int
+    unit: str = ""
+    digits: int = 3
+    once: bool = False
 
 
 SHOWN: Final[Mapping[str, _Column]] = {
-    "rmse_ratio": _Column("RMSE ÷ oracle", "", 3),
-    "nees": _Column("Normalised NEES", "", 2),
+    "rmse_ratio": _Column("RMSE ÷ oracle"),
+    "nees": _Column("Normalised NEES", digits=2),
     "rejected_gross_pct": _Column("Gross errors rejected", "%", 2),
     "rejected_good_pct": _Column("Good fixes rejected", "%", 2),
-    "noise_position": _Column("Noise of the fixes, estimated ÷ true", "", 3),
-    "noise_velocity": _Column("Noise of the velocities, estimated ÷ true", "", 3),
-    "noise_motion": _Column("Noise of the motion, estimated ÷ true", "", 3),
-    "back_s": _Column("Back beside the oracle after a true jump", "s", 1),
+    "noise_position": _Column("Noise of the fixes, estimated ÷ true", once=True),
+    "noise_velocity": _Column("Noise of the velocities, estimated ÷ true", once=True),
+    "noise_motion": _Column("Noise of the motion, estimated ÷ true", once=True),
+    "back_fixes": _Column("Back beside the oracle after a true jump", "fixes", 0),
 }
 """Fields of `Merit` in the order of the tables."""
 
@@ -49,7 +50,8 @@ def tables(options: CompareOptions, runs: Sequence[Mapping[str, Outcomes]]) -> t
     """Make a table of scenarios (rows) and methods (columns) of each figure, mode and kind of log.
 
     Keys are ``FIGURE-MODE-aided`` and ``FIGURE-MODE-alone``; tables without any figure are left
-    out, and rows without any in a table.
+    out, and rows without any in a table. The NEES has the oracle's beside it: it tells how much the
+    figure scatters by itself.
 
     Parameters
     ----------
@@ -59,8 +61,8 @@ def tables(options: CompareOptions, runs: Sequence[Mapping[str, Outcomes]]) -> t
         Outcomes by scenario, of every run.
     """
     made = []
-    for figure in SHOWN:
-        for mode in options.modes:
+    for figure, shown in SHOWN.items():
+        for mode in options.modes[:1] if shown.once else options.modes:
             for kind in KIND_WORDS:
                 table = _table(figure, mode, kind, options, runs)
                 if len(table.rows):
@@ -76,12 +78,13 @@ def _table(
     runs: Sequence[Mapping[str, Outcomes]],
 ) -> Table:
     shown = SHOWN[figure]
+    columns = (*options.methods, ORACLE) if figure == "nees" else options.methods
     missing = Outcome(Merit(*[np.nan] * len(Merit._fields)), np.empty(0))
     lines = [
         {
             scenario: [
                 getattr(run[scenario].get((kind, mode, method), missing).merit, figure)
-                for method in options.methods
+                for method in columns
             ]
             for scenario in options.scenarios
         }
@@ -91,7 +94,7 @@ def _table(
     return gather(
         f"{figure}-{mode}-{kind}",
         f"{shown.title}, {MODE_WORDS[mode]}, {KIND_WORDS[kind]}",
-        options.methods,
+        columns,
         [{row: line[row] for row in kept} for line in lines],
         unit=shown.unit,
         digits=shown.digits,
