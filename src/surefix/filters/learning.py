@@ -15,6 +15,7 @@ from scipy.optimize import minimize
 
 from surefix.filters.hypotheses import Prior, no_hypotheses
 from surefix.filters.hypothesis_review import deleted_residuals
+from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.multi_hypothesis_modes import decide_offline
 from surefix.filters.noise import NoiseFigures, Observations, sample_of, variances
@@ -30,6 +31,8 @@ _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
 _LEAST_WILD = 5.0  # … and at least
 _SHARES = {"isolated": (2.0, 50.0), "partial": (0.2, 50.0)}  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
+_SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
+_BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
 _BEGIN = 3  # epochs whose likelihood is that of the start
 
@@ -106,17 +109,18 @@ def learn(
     """
     sample = sample_of(observations)
     axes = sample.z.shape[1] // 2
-    figures = first
-    prior = supposed(axes, *_usual(figures), speed, longest)
+    prior = supposed(axes, *_usual(first), speed, longest)
     if len(sample.time) < 3 or not np.isfinite(first.position).any():
-        return Learnt(figures, prior)
+        return Learnt(first, prior)
+    motion = _motion(first, axes, order, period)
+    figures = _begun(sample, given, first, prior, floor, motion)
     for _ in range(_ROUNDS):
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
         prior = _counted(prior, said.fixed, residual, math.sqrt(float(np.median(epochs.variance))))
         before = figures
-        figures = _likeliest(sample, said.fixed, prior, given, before, floor, motion)
+        figures = _likeliest(sample, said, prior, given, before, floor, motion)
         if _change(before, figures) < _ENOUGH:
             break
     return Learnt(figures, prior)
@@ -166,7 +170,7 @@ def _counted(prior: Prior, fixed: FloatArray, residual: FloatArray, sigma: float
 
 def _likeliest(
     sample: Observations,
-    fixed: FloatArray,
+    said: Decisions,
     prior: Prior,
     given: NoiseFigures,
     first: NoiseFigures,
@@ -191,11 +195,8 @@ def _likeliest(
 
     def cost(theta: FloatArray) -> float:
         trial = figures(theta)
-        epochs = _epochs(sample, trial)._replace(fixed=fixed)
-        moving = motion._replace(density=np.full(motion.axes, trial.process**2))
-        one = no_hypotheses(motion, 1)
-        _, found, _ = filter_hypotheses(moving, prior, epochs, one, traced=False)
-        return -float(found.evidence[_BEGIN:].sum())
+        epochs = _epochs(sample, trial)._replace(fixed=said.fixed, jump=said.jump)
+        return -_evidence(motion, trial, prior, epochs, 1)
 
     found = minimize(
         cost,
@@ -209,6 +210,35 @@ def _likeliest(
         },
     )
     return figures(found.x)._replace(cost=float(found.fun))
+
+
+def _evidence(
+    motion: Motion, figures: NoiseFigures, prior: Prior, epochs: Epochs, most: int
+) -> float:
+    """Log-likelihood of the observations under some figures."""
+    moving = motion._replace(density=np.full(motion.axes, figures.process**2))
+    bank = no_hypotheses(motion, most)
+    _, found, _ = filter_hypotheses(moving, prior, epochs, bank, traced=False)
+    return float(found.evidence[_BEGIN:].sum())
+
+
+def _begun(
+    sample: Observations,
+    given: NoiseFigures,
+    first: NoiseFigures,
+    prior: Prior,
+    floor: tuple[float, float],
+    motion: Motion,
+) -> NoiseFigures:
+    """The likeliest of a few figures to begin with: many gross errors make ``first`` too large."""
+    free = np.isnan(given.position)
+    trials = []
+    for shrink in _SHRINKS:
+        smaller = np.maximum(first.position * shrink, floor[0])
+        position = np.where(free, smaller, first.position)
+        trials.append(first._replace(position=position))
+    found = [_evidence(motion, t, prior, _epochs(sample, t), _BRIEFLY) for t in trials]
+    return trials[int(np.argmax(found))]
 
 
 def _change(before: NoiseFigures, after: NoiseFigures) -> float:

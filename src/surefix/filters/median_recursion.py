@@ -296,96 +296,92 @@ def _shaped(rows: NDArray[_T], like: FloatArray) -> NDArray[_T]:
 def _run(
     options: MedianRecursion, values: FloatArray, state: MedianState, out: Recursed, i: int
 ) -> None:
-    m = options.window
+    """Filter one axis: row i of ``out``."""
+    m, h, floor = options.window, options.lag, options.floor
+    level, tally, raw, clean = state.level, state.tally, state.raw, state.clean
+    first, second, size = state.first, state.second, state.size
+    feedback = options.form == _FEEDBACK
     for k in range(len(values)):
         y = values[k]
         missing = np.isnan(y)
-        out.residual[i, k] = np.nan
         out.verdict[i, k] = _MISSING if missing else _USED
-        if missing and state.tally[0] == 0:
+        if missing and tally[0] == 0:
             continue
-        state.raw[state.tally[0] % m] = y
-        state.tally[0] += 1
-        if state.tally[0] <= m:
-            _restart(options, state, state.tally[0])
-            out.residual[i, k] = y - state.level[0]
-            out.rate[i, k] = _rate(options, state)
-        else:
-            _advance(options, y, state, out, i, k)
-        out.estimate[i, k] = state.level[0]
-        out.scale[i, k] = _scale(options, state)
+        at = tally[0]
+        raw[at % m] = y
+        tally[0] += 1
+        if at < m:
+            _restart(options, state, at + 1)
+        rate = _rate(options, tally[0], raw, first, second)
+        predicted = level[0] if at < m else level[0] + rate
+        residual = y - predicted
+        out.rate[i, k], out.residual[i, k] = rate, residual
+        if at >= m:
+            used = abs(residual) <= options.gate * max(_SCALE * middle(size), floor)
+            level[0] = predicted + options.gain * residual if used else predicted
+            believed = used or not feedback
+            if believed and not missing:
+                push(size, abs(residual))
+            _remember(clean, first, second, h, options.order, y if believed else predicted, at)
+            if used:
+                tally[1], tally[2] = 0, 0
+            elif not missing or tally[1] > 0:
+                tally[1] += 0 if missing else 1
+                tally[2] += 1
+            if not used and not missing:
+                out.verdict[i, k] = _REJECTED
+            if options.longest_burst > 0 and tally[1] > options.longest_burst:
+                _restart(options, state, min(tally[2], m))
+                out.restart[i, k] = True
+                out.verdict[i, k] = _USED
+        out.estimate[i, k] = level[0]
+        out.scale[i, k] = max(_SCALE * middle(size), floor)
 
 
 @helper
-def _advance(
-    options: MedianRecursion, y: float, state: MedianState, out: Recursed, i: int, k: int
-) -> None:
-    """Predict, gate, update, and let the sample into the medians."""
-    rate = _rate(options, state)
-    predicted = state.level[0] + rate
-    residual = y - predicted
-    missing = np.isnan(y)
-    used = abs(residual) <= options.gate * _scale(options, state)
-    believed = used or options.form != _FEEDBACK
-    state.level[0] = predicted + options.gain * residual if used else predicted
-    if believed and not missing:
-        push(state.size, abs(residual))
-    _remember(options, state, y if believed else predicted, state.tally[0] - 1)
-    if used:
-        state.tally[1] = 0
-        state.tally[2] = 0
-    elif not missing or state.tally[1] > 0:
-        state.tally[1] += 0 if missing else 1
-        state.tally[2] += 1
-    out.rate[i, k] = rate
-    out.residual[i, k] = residual
-    if not used and not missing:
-        out.verdict[i, k] = _REJECTED
-    if options.longest_burst > 0 and state.tally[1] > options.longest_burst:
-        _restart(options, state, min(state.tally[2], options.window))
-        out.restart[i, k] = True
-        out.verdict[i, k] = _USED
-
-
-@helper
-def _rate(options: MedianRecursion, state: MedianState) -> float:
+def _rate(
+    options: MedianRecursion, seen: int, raw: FloatArray, first: SortedWindow, second: SortedWindow
+) -> float:
     """Velocity a step: the median of differences, carried on to now, or the repeated median."""
     if options.form == _REPEATED:
-        return fit_line(_last(options, state, options.window))[1]
-    rate = middle(state.first) / options.lag
+        # the newest sample is not yet known when the state is predicted
+        return fit_line(_last(raw, seen - 1, options.window))[1]
+    rate = middle(first) / options.lag
     if np.isnan(rate):
         return 0.0
-    second = middle(state.second) if options.order == 3 else 0.0
-    if not np.isnan(second):
-        rate += 0.5 * options.window * second / (options.lag * options.lag)
+    if options.order == 3:
+        bent = middle(second)
+        if not np.isnan(bent):
+            rate += 0.5 * options.window * bent / (options.lag * options.lag)
     return rate
 
 
 @helper
-def _scale(options: MedianRecursion, state: MedianState) -> float:
-    return max(_SCALE * middle(state.size), options.floor)
-
-
-@helper
-def _last(options: MedianRecursion, state: MedianState, count: int) -> FloatArray:
-    """The last samples as observed, in the order of time."""
+def _last(raw: FloatArray, seen: int, count: int) -> FloatArray:
+    """The last samples of the ring, in the order of time; NaN before the first."""
     out = np.full(count, np.nan)
-    for i in range(count):
-        at = state.tally[0] - count + i
-        if at >= 0:
-            out[i] = state.raw[at % options.window]
+    for i in range(min(count, seen)):
+        out[count - 1 - i] = raw[(seen - 1 - i) % len(raw)]
     return out
 
 
 @helper
-def _remember(options: MedianRecursion, state: MedianState, value: float, at: int) -> None:
+def _remember(
+    clean: FloatArray,
+    first: SortedWindow,
+    second: SortedWindow,
+    lag: int,
+    order: int,
+    value: float,
+    at: int,
+) -> None:
     """Let sample number ``at`` into the windows of the differences."""
-    m, h = options.window, options.lag
-    state.clean[at % m] = value
-    before = state.clean[(at - h) % m]
-    push(state.first, value - before)
-    if options.order == 3:
-        push(state.second, value - 2.0 * before + state.clean[(at - 2 * h) % m])
+    m = len(clean)
+    clean[at % m] = value
+    before = clean[(at - lag) % m]
+    push(first, value - before)
+    if order == 3:
+        push(second, value - 2.0 * before + clean[(at - 2 * lag) % m])
 
 
 @helper
@@ -394,21 +390,23 @@ def _restart(options: MedianRecursion, state: MedianState, count: int) -> None:
 
     The form ``feedback`` fills the windows with what is near the line, and else with the line.
     """
-    m = options.window
-    samples = _last(options, state, m)
+    m, seen = options.window, state.tally[0]
+    samples = _last(state.raw, seen, m)
     level, slope = fit_line(samples[m - count :])
     line = level + slope * np.arange(1.0 - m, 1.0)
     off = np.abs(samples - line)
     off[: m - count] = np.nan
     for k in range(m):
         push(state.size, off[k])
-    gate = options.gate * _scale(options, state)
+    gate = options.gate * max(_SCALE * middle(state.size), options.floor)
     for k in range(m):
         if options.form == _FEEDBACK and not off[k] <= gate:
             samples[k], off[k] = line[k], np.nan
     for k in range(m):
         push(state.size, off[k])
-        _remember(options, state, samples[k], state.tally[0] - m + k)
+        _remember(
+            state.clean, state.first, state.second, options.lag, options.order,
+            samples[k], seen - m + k,
+        )  # fmt: skip
     state.level[0] = level
-    state.tally[1] = 0
-    state.tally[2] = 0
+    state.tally[1], state.tally[2] = 0, 0

@@ -80,6 +80,15 @@ def _apply_velocity(
 
 
 @helper
+def _displace(motion: Motion, bank: Bank, jump: int) -> None:
+    """Forget the positions that jump here by a decision made beforehand; the rates go on."""
+    for i in range(bank.number[0]):
+        for a in range(motion.axes):
+            if (jump >> a) & 1:
+                bank.seen[i, a] = False
+
+
+@helper
 def _commit_lasting(motion: Motion, prior: Prior, bank: Bank, time: float, said: IntArray) -> None:
     """Take the runs for true jumps that last too long, or longer than the track before them."""
     for i in range(bank.number[0]):
@@ -175,6 +184,8 @@ def _run(
                     predict_axis(
                         one.mean[i, a], one.covariance[i, a], motion.order, dt, motion.density[a]
                     )
+        if epochs.jump[k]:
+            _displace(motion, one, epochs.jump[k])
         _innovate(motion, one, k, z, r, found)
         placed = moved = False
         for a in range(d):
@@ -232,7 +243,7 @@ def filter_hypotheses(
     motion, prior
         Model, whose groups are single components, and what is supposed.
     epochs
-        n observations; weights that they fix beforehand decide. Their jumps are not read.
+        n observations; weights and jumps that they fix beforehand stay.
     bank
         From `no_hypotheses` or from an earlier call.
     traced

@@ -34,7 +34,7 @@ CHANNEL_HEAD = 2000
 """Values that a series is settled on in real time; the other modes see it whole."""
 
 _RECOVERY_VALUES = 30
-_RUN_VALUES = 40  # longest run of wrong values that several hypotheses survive
+_RUN_VALUES = 39.5  # longest run of wrong values that several hypotheses survive
 _LAG_VALUES = 20
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise

@@ -24,7 +24,7 @@ FARTHEST = 1e9
 """m: what lies beyond is as wild as what lies there, and its square is finite."""
 _LAG_FIXES = 20
 _RECOVERY_FIXES = 30
-_RUN_FIXES = 40  # longest run of wrong fixes that several hypotheses survive
+_RUN_FIXES = 39.5  # longest run of wrong fixes that several hypotheses survive
 _FEW_HEIGHTS = 3  # heights that show an offset
 _ANOTHER_DEPTH = 200.0  # m: a depth that differs more is not the vehicle's
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
