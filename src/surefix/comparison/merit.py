@@ -126,9 +126,9 @@ def _rejected(trial: Trial, cleaned: Cleaned, rows: BoolArray) -> tuple[float, f
     judged = cleaned.verdicts
     some = judged.reason == Reason.AXIS_OFF  # detail says which, the others were used
     rejected = (judged.verdict == Verdict.REJECTED) | (judged.weight <= _REJECTED)
-    axes = np.where(some, np.nan_to_num(judged.detail), 3.0).astype(np.int64)
-    block = np.array([1, 1, 2])[: trial.world.axes]  # bits of horizontal and vertical axes
-    wrong = np.where(np.abs(trial.error) > GROSS_SIGMA * trial.world.sigma_m, block, 0)
+    axes = np.where(some, np.nan_to_num(judged.detail), 7.0).astype(np.int64)
+    bits = 1 << np.arange(trial.world.axes)
+    wrong = np.where(np.abs(trial.error) > GROSS_SIGMA * trial.world.sigma_m, bits, 0)
     every = rejected & ((wrong & ~axes[:, None]) == 0).all(axis=1)
     gross = (wrong > 0).any(axis=1)
     good = ~trial.bad_fix.any(axis=1) & np.isfinite(trial.fixes).any(axis=1)
