@@ -34,121 +34,23 @@ read. Siegel 1982, *Robust regression using repeated medians*, Biometrika 69, 24
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surefix.cleaning.running_median import SortedWindow, middle, push, sorted_window
+from surefix.cleaning.running_median import sorted_window
 from surefix.errors import OptionsError
-from surefix.jit import helper, kernel
-from surefix.robust.repeated_median import fit_line
-from surefix.types import BoolArray, FloatArray, IntArray, Verdict
+from surefix.filters.median_step import FORMS, MedianRecursion, MedianState, Recursed, run
+from surefix.types import FloatArray
 
 __all__ = [
-    "FORMS",
-    "MedianRecursion",
-    "MedianState",
-    "Recursed",
     "filter_medians",
     "median_recursion",
     "start_medians",
 ]
 
-FORMS: Final = ("printed", "repeated-median", "feedback")
-"""Readings of the recursion; a `MedianRecursion` holds the index."""
-
 _T = TypeVar("_T", np.float64, np.int64, np.bool_)
-_SCALE: Final = 1.4826022185056018  # σ of a normal distribution over its median absolute deviation
-_REPEATED, _FEEDBACK = FORMS.index("repeated-median"), FORMS.index("feedback")
-_USED, _REJECTED, _MISSING = int(Verdict.USED), int(Verdict.REJECTED), int(Verdict.MISSING)
-
-
-class MedianRecursion(NamedTuple):
-    """Settings of the recursion, made by `median_recursion`.
-
-    Parameters
-    ----------
-    form
-        Index into ``FORMS``.
-    order
-        2 constant velocity, 3 constant acceleration.
-    window, lag
-        Samples m in the window, and h between the ends of a difference.
-    gain, gate
-        K of the update and c of the gate.
-    longest_burst
-        Rejected samples on end that are survived; 0 never restarts.
-    floor
-        Least scale s, in the unit of the samples.
-    """
-
-    form: int
-    order: int
-    window: int
-    lag: int
-    gain: float
-    gate: float
-    longest_burst: int
-    floor: float
-
-
-class MedianState(NamedTuple):
-    """All the recursion remembers of one axis; changed in place by the kernel alone.
-
-    Parameters
-    ----------
-    level
-        (1,) estimate x̂; NaN before the first sample.
-    tally
-        (3,) samples since the first, rejected samples on end, samples since the first of those.
-    raw, clean
-        (m,) last samples in a ring, as observed and as they entered the medians.
-    first, second, size
-        Windows of the first and second differences over h, and of the size of the residuals.
-    """
-
-    level: FloatArray
-    tally: IntArray
-    raw: FloatArray
-    clean: FloatArray
-    first: SortedWindow
-    second: SortedWindow
-    size: SortedWindow
-
-    def copy(self) -> MedianState:
-        """Copy the state, so that the copy can go its own way."""
-        return MedianState(
-            self.level.copy(), self.tally.copy(), self.raw.copy(), self.clean.copy(),
-            self.first.copy(), self.second.copy(), self.size.copy(),
-        )  # fmt: skip
-
-
-class Recursed(NamedTuple):
-    """What the recursion found at each sample; arrays of the shape of the samples.
-
-    Parameters
-    ----------
-    estimate
-        x̂, in the unit of the samples; NaN before the first sample.
-    rate
-        v̂ a step, as used for the prediction.
-    residual
-        r = y − ŷ, before the update; NaN where the sample is missing.
-    scale
-        s after the sample; too small while the first few samples come in.
-    verdict
-        Codes of `surefix.types.Verdict`: used, rejected or missing.
-    restart
-        Where the state restarted because more than L samples on end had been rejected.
-    """
-
-    estimate: FloatArray
-    rate: FloatArray
-    residual: FloatArray
-    scale: FloatArray
-    verdict: IntArray
-    restart: BoolArray
 
 
 def median_recursion(
@@ -167,7 +69,7 @@ def median_recursion(
     Parameters
     ----------
     form
-        One of ``FORMS``.
+        ``printed``, ``repeated-median`` or ``feedback``.
     model
         ``cv`` or ``ca``; the repeated median only knows ``cv``.
     window
@@ -210,7 +112,7 @@ def median_recursion(
             "0 < gain ≤ 1, gate > 0, floor ≥ 0 and a longest burst of at least 1",
         )
     code = FORMS.index(form)
-    promise = longest_burst if code == _FEEDBACK else 0
+    promise = longest_burst if form == "feedback" else 0
     return MedianRecursion(code, order, window, lag, gain, gate, promise, floor)
 
 
@@ -277,7 +179,7 @@ def filter_medians(
         np.zeros(shape, np.bool_),
     )
     for i, state in enumerate(after):
-        _run(options, np.ascontiguousarray(columns[i]), state, found, i)
+        run(options, np.ascontiguousarray(columns[i]), state, found, i)
     return after, Recursed(
         _shaped(found.estimate, given),
         _shaped(found.rate, given),
@@ -290,123 +192,3 @@ def filter_medians(
 
 def _shaped(rows: NDArray[_T], like: FloatArray) -> NDArray[_T]:
     return np.ascontiguousarray(rows.T).reshape(like.shape)
-
-
-@kernel
-def _run(
-    options: MedianRecursion, values: FloatArray, state: MedianState, out: Recursed, i: int
-) -> None:
-    """Filter one axis: row i of ``out``."""
-    m, h, floor = options.window, options.lag, options.floor
-    level, tally, raw, clean = state.level, state.tally, state.raw, state.clean
-    first, second, size = state.first, state.second, state.size
-    feedback = options.form == _FEEDBACK
-    for k in range(len(values)):
-        y = values[k]
-        missing = np.isnan(y)
-        out.verdict[i, k] = _MISSING if missing else _USED
-        if missing and tally[0] == 0:
-            continue
-        at = tally[0]
-        raw[at % m] = y
-        tally[0] += 1
-        if at < m:
-            _restart(options, state, at + 1)
-        rate = _rate(options, tally[0], raw, first, second)
-        predicted = level[0] if at < m else level[0] + rate
-        residual = y - predicted
-        out.rate[i, k], out.residual[i, k] = rate, residual
-        if at >= m:
-            used = abs(residual) <= options.gate * max(_SCALE * middle(size), floor)
-            level[0] = predicted + options.gain * residual if used else predicted
-            believed = used or not feedback
-            if believed and not missing:
-                push(size, abs(residual))
-            _remember(clean, first, second, h, options.order, y if believed else predicted, at)
-            if used:
-                tally[1], tally[2] = 0, 0
-            elif not missing or tally[1] > 0:
-                tally[1] += 0 if missing else 1
-                tally[2] += 1
-            if not used and not missing:
-                out.verdict[i, k] = _REJECTED
-            if options.longest_burst > 0 and tally[1] > options.longest_burst:
-                _restart(options, state, min(tally[2], m))
-                out.restart[i, k] = True
-                out.verdict[i, k] = _USED
-        out.estimate[i, k] = level[0]
-        out.scale[i, k] = max(_SCALE * middle(size), floor)
-
-
-@helper
-def _rate(
-    options: MedianRecursion, seen: int, raw: FloatArray, first: SortedWindow, second: SortedWindow
-) -> float:
-    """Velocity a step: the median of differences, carried on to now, or the repeated median."""
-    if options.form == _REPEATED:
-        # the newest sample is not yet known when the state is predicted
-        return fit_line(_last(raw, seen - 1, options.window))[1]
-    rate = middle(first) / options.lag
-    if np.isnan(rate):
-        return 0.0
-    if options.order == 3:
-        bent = middle(second)
-        if not np.isnan(bent):
-            rate += 0.5 * options.window * bent / (options.lag * options.lag)
-    return rate
-
-
-@helper
-def _last(raw: FloatArray, seen: int, count: int) -> FloatArray:
-    """The last samples of the ring, in the order of time; NaN before the first."""
-    out = np.full(count, np.nan)
-    for i in range(min(count, seen)):
-        out[count - 1 - i] = raw[(seen - 1 - i) % len(raw)]
-    return out
-
-
-@helper
-def _remember(
-    clean: FloatArray,
-    first: SortedWindow,
-    second: SortedWindow,
-    lag: int,
-    order: int,
-    value: float,
-    at: int,
-) -> None:
-    """Let sample number ``at`` into the windows of the differences."""
-    m = len(clean)
-    clean[at % m] = value
-    before = clean[(at - lag) % m]
-    push(first, value - before)
-    if order == 3:
-        push(second, value - 2.0 * before + clean[(at - 2 * lag) % m])
-
-
-@helper
-def _restart(options: MedianRecursion, state: MedianState, count: int) -> None:
-    """Begin anew at the repeated-median line through the last ``count`` samples.
-
-    The form ``feedback`` fills the windows with what is near the line, and else with the line.
-    """
-    m, seen = options.window, state.tally[0]
-    samples = _last(state.raw, seen, m)
-    level, slope = fit_line(samples[m - count :])
-    line = level + slope * np.arange(1.0 - m, 1.0)
-    off = np.abs(samples - line)
-    off[: m - count] = np.nan
-    for k in range(m):
-        push(state.size, off[k])
-    gate = options.gate * max(_SCALE * middle(state.size), options.floor)
-    for k in range(m):
-        if options.form == _FEEDBACK and not off[k] <= gate:
-            samples[k], off[k] = line[k], np.nan
-    for k in range(m):
-        push(state.size, off[k])
-        _remember(
-            state.clean, state.first, state.second, options.lag, options.order,
-            samples[k], seen - m + k,
-        )  # fmt: skip
-    state.level[0] = level
-    state.tally[1], state.tally[2] = 0, 0

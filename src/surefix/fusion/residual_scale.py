@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
-from surefix.filters.median_recursion import FORMS, MedianRecursion
+from surefix.filters.median_step import FORMS, MedianRecursion
 from surefix.types import FloatArray
 
 __all__ = ["Fused", "fuse_by_scale", "noise_gain"]

@@ -44,12 +44,12 @@ def repeated_median(values: ArrayLike) -> tuple[float, float]:
 def fit_line(values: FloatArray) -> tuple[float, float]:
     """Kernel of `repeated_median`."""
     n = len(values)
-    at = np.empty(n)
+    at = np.empty(n, np.int64)
     known = np.empty(n)
     m = 0
     for k in range(n):
         if not np.isnan(values[k]):
-            at[m] = k - n + 1.0
+            at[m] = k - n + 1
             known[m] = values[k]
             m += 1
     if m == 0:
@@ -58,10 +58,14 @@ def fit_line(values: FloatArray) -> tuple[float, float]:
     if m > 1:
         inner = np.empty(m)
         slopes = np.empty(m - 1)
+        apart = np.arange(1.0 - n, n)
+        apart[n - 1] = 1.0
+        inverse = 1.0 / apart
         for i in range(m):
             for j in range(m):
                 if j != i:
-                    slopes[j if j < i else j - 1] = (known[j] - known[i]) / (at[j] - at[i])
+                    rise = known[j] - known[i]
+                    slopes[j if j < i else j - 1] = rise * inverse[at[j] - at[i] + n - 1]
             inner[i] = _median(slopes, m - 1)
         slope = _median(inner, m)
     for i in range(m):

@@ -3,8 +3,8 @@
 The aircraft flies straight and swerves weakly once, between two of its samples. Radar A is the less
 exact one. What is wrong with its measurements, and known to be:
 
-- runs of consecutive wild ones (15 in the paper), all of a run off by the same amount in range,
-  azimuth and elevation, beside their noise;
+- runs of consecutive wild ones (15 in the paper): a false target that keeps a constant distance
+  from the aircraft;
 - isolated wild ones;
 - a stretch in which its noise is several times as large as usual.
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
-from surefix.models.radar import Site, site, to_polar
+from surefix.models.radar import Site, polar_jacobian, site, to_polar
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["RadarFlight", "RadarLog", "simulate"]
@@ -110,8 +110,8 @@ def simulate(
     bursts
         First sample and length of each run of wild measurements of A.
     wild_share, wild_sigma
-        Share of isolated wild measurements of A; least and greatest size of any wild one in
-        standard deviations of each component, its sign drawn.
+        Share of isolated wild measurements of A; how far, at least and at most, any wild one is off
+        along each of x, y, z, in standard deviations of A's noise there. The sign is drawn.
     noisy
         First sample, first after, and factor of the noise of A.
     sigma_a, sigma_b
@@ -201,8 +201,10 @@ def _measure(
 ) -> tuple[Site, FloatArray, FloatArray, FloatArray]:
     at, noise = site(place), _radians(sigma)
     bias = rng.uniform(-limit, limit)
-    draws = louder[:, None] * rng.standard_normal(position.shape) + size
-    polar = to_polar(position, at) + bias + noise * draws
+    spread = polar_jacobian(to_polar(position, at), at) * noise
+    false = position + size * np.sqrt(np.sum(spread**2, axis=-1))
+    draws = louder[:, None] * rng.standard_normal(position.shape)
+    polar = to_polar(false, at) + bias + noise * draws
     polar[:, 1] = np.mod(polar[:, 1], 2.0 * math.pi)
     return at, polar, noise, bias
 
