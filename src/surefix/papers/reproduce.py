@@ -67,6 +67,10 @@ def reproduce(
             from surefix.papers import cooperative
 
             return cooperative.run(cooperative.CooperativeOptions(seed=seed, runs=runs), progress)
+        case "radar":
+            from surefix.papers import radar
+
+            return radar.run(radar.RadarOptions(seed=seed, runs=runs), progress)
         case "ship":
             from surefix.papers import ship, ship_log
 
