@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from docs.pages import ROOT, blocks, run_console
 from surefix.cli import main
 from surefix.errors import InputError, OptionsError
 from surefix.papers.reproduce import contents, reproduce
@@ -115,6 +116,15 @@ def test_yachts(data, name):
     assert max(share for row, share in by_name.items() if "depth" not in row) < 0.5
     assert by_name["IIDPT depth"] < 10.0  # the sounder lost the bottom
     assert tables["record"].mean[:2, 1].min() > 90.0
+
+
+def test_recorded_example_gives_the_figures_of_the_page(data, monkeypatch):
+    monkeypatch.chdir(data / "ship_yachts")
+    page = ROOT / "docs" / "papers" / "ship.md"
+    recorded = [block for block in blocks(page) if block.info == "recorded"]
+    assert recorded
+    for block in recorded:
+        run_console(block.text, f"{page.name}:{block.line}")
 
 
 def test_receivers_of_a_research_vessel_agree(data):

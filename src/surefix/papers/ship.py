@@ -32,7 +32,7 @@ from surefix.simulate.ship_faults import BURSTS
 
 __all__ = ["SOURCE", "ShipPaperOptions", "run"]
 
-SOURCE = "Lü and Geng, improved 53H on-line smoothing of a ship's integrated navigation data"
+SOURCE = "Lü Wu and Geng Jianning, ship navigation data smoothed by improved 53H (in Chinese)"
 
 _RECORD = ("east", "north", "speed", "heading", "depth")
 _WITH_UNITS = tuple(f"{name.replace('_', ' ')}, {UNITS[name][0]}" for name in CHANNELS)
