@@ -15,6 +15,7 @@ from surefix.papers.radar_methods import (
     OURS,
     PRINTED,
     TOLD,
+    TOLD_CV,
     Cartesian,
     Fusion,
     cv_names,
@@ -69,36 +70,38 @@ def _errors(
 ) -> Figure:
     """Error of radar A in one axis, before and after each filter."""
     at = _thinned(parts, len(flight.position))
-    slow, nine, twenty = cv_names()
-    shown = (
-        ("(a) before filtering", (BEFORE,)),
-        (f"(b) {slow}", (slow,)),
-        (f"(c) {nine}", (nine,)),
-        (f"(d) {twenty}", (twenty,)),
-        (f"(e) {CURRENT}", (CURRENT,)),
-        ("(f) medians", (PRINTED, OURS)),
+    error = {method: x[:, axis] - flight.position[:, axis] for method, x in one.items()}
+    wild = np.flatnonzero(flight.radars[0].wild & (np.arange(len(error[BEFORE])) >= parts.settled))
+    reach = 1.1 * float(np.abs(error[BEFORE][wild]).max(initial=_REACH[axis]))
+    near = (-_REACH[axis], _REACH[axis])
+    few = np.arange(parts.settled, len(flight.position), _EVERY)
+    first = (
+        Trace("measured", few.astype(np.float64), error[BEFORE][few], "raw"),
+        Trace("wild", wild.astype(np.float64), error[BEFORE][wild], "bad"),
+    )
+    after = (*cv_names(), CURRENT, OURS, PRINTED, TOLD_CV)
+
+    def panel(
+        letter: str, title: str, traces: tuple[Trace, ...], shown: tuple[float, float]
+    ) -> Panel:
+        return Panel(
+            title=f"({letter}) {title}",
+            x_label=_LABEL,
+            y_label=f"error in {name}, m",
+            traces=traces,
+            y_range=shown,
+        )
+
+    lines = (
+        panel(letter, method, (Trace("filtered", at.astype(np.float64), error[method][at]),), near)
+        for letter, method in zip("bcdefgh", after, strict=True)
     )
     return Figure(
         key=f"error-{name.lower()}",
         title=f"Error of radar A in {name} before and after filtering (beside Fig. {no})",
-        panels=tuple(
-            Panel(
-                title=title,
-                x_label=_LABEL,
-                y_label=f"error in {name}, m",
-                traces=tuple(
-                    Trace(
-                        method, at.astype(np.float64), (one[method] - flight.position)[at, axis],
-                        "raw" if method == BEFORE else "line",
-                    )
-                    for method in names
-                ),
-                y_range=(-_REACH[axis], _REACH[axis]),
-            )
-            for title, names in shown
-        ),
+        panels=(panel("a", BEFORE, first, (-reach, reach)), *lines),
         columns=2,
-    )  # fmt: skip
+    )
 
 
 def _differences(
@@ -119,7 +122,7 @@ def _differences(
 
     truth = trace("truth", flight.position, "truth")
     steps = truth.y
-    near = (float(steps.min()) - 4.0, float(steps.max()) + 4.0)
+    near = (float(steps.min()) - 8.0, float(steps.max()) + 8.0)
 
     def panel(title: str, shown: Trace, y_range: tuple[float, float]) -> Panel:
         return Panel(
@@ -154,29 +157,37 @@ def _fused(
     series: tuple[Cartesian, Cartesian],
     both: Mapping[str, Fusion],
 ) -> Figure:
+    """Errors of the fused track in Y and Z."""
     at = _thinned(parts, len(flight.position))
-    x = at.astype(np.float64)
-    panels = []
-    for axis, name in ((1, "Y"), (2, "Z")):
-        traces = [
-            Trace("radar A, measured", x, (series[0].position - flight.position)[at, axis], "raw")
-        ]
-        for title, key in (
-            ("CV Kalman, inverse covariance", "CV Kalman, inverse covariance"),
-            ("fused by residual scale", "residual scale"),
-            (TOLD, TOLD),
-        ):
-            traces.append(Trace(title, x, (both[key].position - flight.position)[at, axis]))
-        panels.append(
-            Panel(
-                x_label=_LABEL,
-                y_label=f"error in {name}, m",
-                traces=tuple(traces),
-                y_range=(-80.0, 80.0),
-            )
+    few = np.arange(parts.settled, len(flight.position), _EVERY)
+    lines = (
+        ("CV Kalman, inverse covariance", "CV Kalman, inverse covariance"),
+        ("medians, residual scale", "residual scale"),
+        (TOLD, TOLD),
+    )
+
+    def off(position: FloatArray, rows: IntArray, axis: int) -> FloatArray:
+        return np.asarray(position[rows, axis] - flight.position[rows, axis])
+
+    panels = tuple(
+        Panel(
+            x_label=_LABEL,
+            y_label=f"error in {name}, m",
+            traces=(
+                Trace(
+                    "A, measured", few.astype(np.float64), off(series[0].position, few, axis), "raw"
+                ),
+                *(
+                    Trace(title, at.astype(np.float64), off(both[key].position, at, axis))
+                    for title, key in lines
+                ),
+            ),
+            y_range=(-80.0, 80.0),
         )
+        for axis, name in ((1, "Y"), (2, "Z"))
+    )
     return Figure(
-        key="fused", title="Error of both radars fused (beside Fig. 7)", panels=tuple(panels)
+        key="fused", title="Error of both radars fused (beside Fig. 7)", panels=panels, columns=2
     )
 
 
@@ -212,7 +223,12 @@ def _breakdown(tables: Mapping[str, Table]) -> Figure:
                 x_label="length of the burst, samples",
                 y_label="survived, %",
                 traces=tuple(
-                    Trace(row, np.asarray(LENGTHS, dtype=np.float64), mean, "points")
+                    Trace(
+                        row.replace("CV Kalman, ", "CV "),
+                        np.asarray(LENGTHS, dtype=np.float64),
+                        mean,
+                        "points",
+                    )
                     for row, mean in zip(table.rows, table.mean, strict=True)
                 ),
                 y_range=(-4.0, 104.0),
