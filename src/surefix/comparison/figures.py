@@ -17,13 +17,15 @@ from surefix.types import FloatArray
 __all__ = ["figures"]
 
 _TOLD = "burst-common"  # the scenario whose errors are drawn, where it is among those compared
-_RANGE = (0.9, 60.0)  # of the ratios shown
+_BEFORE, _AFTER = 80, 160  # rows drawn round what happens in it
+_BURST = 30  # rows in which the gross errors are counted to find that
+_RANGE = (0.6, 60.0)  # of the ratios shown
 
 
 def figures(
     options: CompareOptions, tables: Mapping[str, Table], first: Mapping[str, Outcomes]
 ) -> tuple[Figure, ...]:
-    """Draw the ratios of every mode, and the errors in one scenario of the first run.
+    """Draw the ratios of every mode, and errors round a run of bad fixes in one scenario.
 
     Parameters
     ----------
@@ -32,7 +34,7 @@ def figures(
     tables
         All tables by key.
     first
-        Outcomes of the first run by scenario.
+        Outcomes of the first run by scenario; the errors are from it.
     """
     scenario = _TOLD if _TOLD in options.scenarios else options.scenarios[0]
     return (*(_ratios(mode, tables) for mode in options.modes), _errors(options, scenario, first))
@@ -75,6 +77,10 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
     kind = "aided" if trial.scenario.velocity_runs else "alone"
     trial = trial if kind == "aided" else alone(trial)
     wrong = np.sqrt((trial.error**2).sum(axis=1))
+    crowd = np.convolve(wrong > 0.0, np.ones(_BURST), mode="valid")
+    centre = trial.jump if trial.jump >= 0 else int(np.argmax(crowd))
+    rows = slice(max(centre - _BEFORE, 0), centre + _AFTER)
+    time, wrong = trial.time[rows], wrong[rows]
     bad = wrong > 0.0
     panels = []
     for mode in options.modes:
@@ -88,9 +94,9 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
                 x_label="time, s" if mode == options.modes[-1] else "",
                 y_label="error, m",
                 traces=(
-                    Trace("gross error of the fix", trial.time[bad], wrong[bad], "bad"),
+                    Trace("gross error of the fix", time[bad], wrong[bad], "bad"),
                     *(
-                        Trace(name, trial.time, error, "truth" if name == ORACLE else "line")
+                        Trace(name, time, error[rows], "truth" if name == ORACLE else "line")
                         for name, error in lines.items()
                     ),
                 ),
