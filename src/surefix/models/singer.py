@@ -126,7 +126,7 @@ def _series(x: float) -> tuple[FloatArray, FloatArray]:
         for j, l in enumerate((2, 1, 0)):
             degree = order[:, None] + order + k + l + 1
             noise[i, j] = np.sum(np.outer(coefficients[i], coefficients[j]) / degree)
-    return coefficients.sum(axis=1), noise
+    return coefficients.sum(axis=1), 0.5 * (noise + noise.T)
 
 
 def _rest(x: float) -> FloatArray:
