@@ -15,7 +15,15 @@ import numpy as np
 from surefix.filters.current_statistical import filter_current
 from surefix.filters.median_recursion import filter_medians, median_recursion
 from surefix.models.singer import singer
-from surefix.papers.radar_methods import CURRENT, OURS, PRINTED, Cartesian, cv_names, filter_cv
+from surefix.papers.radar_methods import (
+    CURRENT,
+    OURS,
+    PRINTED,
+    ROBUST,
+    Cartesian,
+    cv_names,
+    filter_cv,
+)
 from surefix.types import FloatArray
 
 __all__ = ["KINDS", "LENGTHS", "REPEATED", "burst_methods", "longest", "settings", "survived"]
@@ -40,11 +48,17 @@ def burst_methods(density: float, window: int) -> dict[str, Method]:
     """Each filter as a function on several independent series."""
     model = singer(1.0 / 20.0, _DT)
 
-    def cv(factor: int) -> Method:
+    def cv(factor: int, robust: bool = False) -> Method:
         def run(z: FloatArray, states: Any) -> tuple[Any, FloatArray]:
             groups = [z[:, i : i + 3] for i in range(0, z.shape[1], 3)]
             done = [
-                filter_cv(Cartesian(g, np.full(g.shape, _SIGMA**2)), _DT, factor * density, state)
+                filter_cv(
+                    Cartesian(g, np.full(g.shape, _SIGMA**2)),
+                    _DT,
+                    factor * density,
+                    state,
+                    robust=robust,
+                )
                 for g, state in zip(groups, states or [None] * len(groups), strict=True)
             ]
             return [each[0] for each in done], np.hstack([each[1] for each in done])
@@ -58,7 +72,7 @@ def burst_methods(density: float, window: int) -> dict[str, Method]:
     found = {name: cv(factor) for name, factor in zip(cv_names(), (1, 9, 20), strict=True)}
     forms = ((PRINTED, "printed"), (REPEATED, "repeated-median"), (OURS, "feedback"))
     medians = {name: _medians(form, window=window) for name, form in forms}
-    return found | {CURRENT: current} | medians
+    return found | {CURRENT: current} | medians | {ROBUST: cv(20, robust=True)}
 
 
 def survived(

@@ -14,8 +14,7 @@ from surefix.papers.radar_methods import (
     CURRENT,
     OURS,
     PRINTED,
-    TOLD,
-    TOLD_CV,
+    ROBUST,
     Cartesian,
     Fusion,
     cv_names,
@@ -79,7 +78,7 @@ def _errors(
         Trace("measured", few.astype(np.float64), error[BEFORE][few], "raw"),
         Trace("wild", wild.astype(np.float64), error[BEFORE][wild], "bad"),
     )
-    after = (*cv_names(), CURRENT, OURS, PRINTED, TOLD_CV)
+    after = (*cv_names(), CURRENT, OURS, PRINTED, ROBUST)
 
     def panel(
         letter: str, title: str, traces: tuple[Trace, ...], shown: tuple[float, float]
@@ -161,9 +160,9 @@ def _fused(
     at = _thinned(parts, len(flight.position))
     few = np.arange(parts.settled, len(flight.position), _EVERY)
     lines = (
-        ("CV Kalman, inverse covariance", "CV Kalman, inverse covariance"),
-        ("medians, residual scale", "residual scale"),
-        (TOLD, TOLD),
+        ("CV Kalman", "CV Kalman, inverse covariance"),
+        ("medians by residual scale", "residual scale"),
+        ("IGG3 Kalman", "IGG3 Kalman, inverse covariance"),
     )
 
     def off(position: FloatArray, rows: IntArray, axis: int) -> FloatArray:
@@ -224,7 +223,7 @@ def _breakdown(tables: Mapping[str, Table]) -> Figure:
                 y_label="survived, %",
                 traces=tuple(
                     Trace(
-                        row.replace("CV Kalman, ", "CV "),
+                        row.replace("Kalman, ", ""),
                         np.asarray(LENGTHS, dtype=np.float64),
                         mean,
                         "points",

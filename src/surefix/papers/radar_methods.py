@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,9 +22,11 @@ from surefix.types import FloatArray
 
 __all__ = [
     "BEFORE",
+    "COUNTED",
     "CURRENT",
     "OURS",
     "PRINTED",
+    "ROBUST",
     "TOLD",
     "TOLD_CV",
     "Cartesian",
@@ -39,17 +40,19 @@ __all__ = [
     "systematic",
 ]
 
+COUNTED: Final = "residual scale, smoothing counted"
 BEFORE: Final = "before filtering"
 CURRENT: Final = "current statistical"
 PRINTED: Final = "medians, printed"
 OURS: Final = "medians, feedback"
+ROBUST: Final = "IGG3 Kalman, 20Q0"
 TOLD: Final = "oracle"
 TOLD_CV: Final = "CV Kalman, 20Q0, told"
 
 _FACTORS: Final = (1, 9, 20)
 _ALPHA, _HIGHEST = 1.0 / 20.0, 10.0  # 1/s, evasion lasts 10–30 s; m/s²
 _EVERY: Final = 20  # of the samples used for registration without a reference
-_NEVER: Final = Recovery(np.inf, 1e3)
+_NEVER, _LATER = Recovery(np.inf, 1e3), Recovery(2.5, 1e3)  # 2.5 s are 50 samples
 
 
 class Cartesian(NamedTuple):
@@ -119,7 +122,12 @@ def cartesian(log: RadarLog, bias: FloatArray) -> Cartesian:
 
 
 def filter_cv(
-    series: Cartesian, dt: float, density: float, state: TrackState | None = None
+    series: Cartesian,
+    dt: float,
+    density: float,
+    state: TrackState | None = None,
+    *,
+    robust: bool = False,
 ) -> tuple[TrackState, FloatArray, FloatArray]:
     """Kalman filter of constant velocity: state, positions (n, 3) and their variances (n, 3).
 
@@ -133,10 +141,13 @@ def filter_cv(
         Q as a spectral density of the acceleration, m²/s³.
     state
         From an earlier call, or None.
+    robust
+        Weigh by IGG3, and believe what was rejected for 2.5 s on end, as `surefix clean` does.
     """
+    recovery, loss = (_LATER, "igg3") if robust else (_NEVER, "kalman")
     n, axes = series.position.shape
     motion = Motion(2, axes, np.full(axes, density), by_axis(axes), 2 * axes, 0.0)
-    state = start(motion, _NEVER) if state is None else state
+    state = start(motion, recovery) if state is None else state
     first = 0.0 if np.isnan(state.time) else state.time + dt
     none = np.full((n, axes), np.nan)
     epochs = Epochs(
@@ -146,7 +157,7 @@ def filter_cv(
         np.full((n, 2 * axes), np.nan),
         np.zeros(n, np.int64),
     )
-    state, found, _ = filter_track(motion, loss_named("kalman"), _NEVER, epochs, state)
+    state, found, _ = filter_track(motion, loss_named(loss), recovery, epochs, state)
     rows = found.factor[:, :axes]
     return state, found.mean[:, :axes].copy(), np.sum(rows * rows, axis=-1)
 
@@ -175,6 +186,7 @@ def filter_one(
     for name, form in ((PRINTED, "printed"), (OURS, "feedback")):
         options = median_recursion(form, window=window)
         found[name] = filter_medians(options, series.position)[1].estimate
+    found[ROBUST] = filter_cv(series, flight.dt, _FACTORS[-1] * density, robust=True)[1]
     found[TOLD_CV] = filter_cv(_told(flight, series), flight.dt, _FACTORS[-1] * density)[1]
     return found
 
@@ -194,10 +206,12 @@ def fuse_both(
     found["mean"] = Fusion(positions.mean(axis=0), np.full_like(positions[0], np.nan))
     fused = fuse_by_scale(positions, np.array([each.scale for each in both]))
     found["residual scale"] = Fusion(fused.estimate, fused.variance)
-    found["residual scale, smoothing counted"] = Fusion(fused.estimate, smoothing * fused.variance)
+    found[COUNTED] = Fusion(fused.estimate, smoothing * fused.variance)
     by_usual = fuse_by_scale(positions, np.sqrt(usual))
     found["usual noise"] = Fusion(by_usual.estimate, smoothing * by_usual.variance)
-    found["CV Kalman, inverse covariance"] = _fused_cv(flight, a, b, density)
+    for robust, name in ((False, "CV Kalman"), (True, "IGG3 Kalman")):
+        made = _fused_cv(flight, a, b, density, robust)
+        found[f"{name}, inverse covariance"] = made
     told = np.array([filter_medians(options, _told(flight, a).position)[1].estimate, positions[1]])
     real = usual * np.array([log.noise[:, None] ** 2 for log in flight.radars])
     best = fuse_by_scale(told, np.sqrt(real))
@@ -215,15 +229,17 @@ def _told(flight: RadarFlight, series: Cartesian) -> Cartesian:
     return series._replace(position=np.where(wild, np.nan, series.position))
 
 
-def _fused_cv(flight: RadarFlight, a: Cartesian, b: Cartesian, density: float) -> Fusion:
+def _fused_cv(
+    flight: RadarFlight, a: Cartesian, b: Cartesian, density: float, robust: bool
+) -> Fusion:
     """The most agile CV Kalman filter of each radar, fused by inverse covariance, axis by axis."""
     mean, variance = zip(
-        *(filter_cv(series, flight.dt, _FACTORS[-1] * density)[1:] for series in (a, b)),
+        *(
+            filter_cv(series, flight.dt, _FACTORS[-1] * density, robust=robust)[1:]
+            for series in (a, b)
+        ),
         strict=True,
     )
-    stacked: Mapping[str, FloatArray] = {
-        "mean": np.stack(mean, axis=1), "variance": np.stack(variance, axis=1)
-    }  # fmt: skip
-    diagonal = stacked["variance"][..., None] * np.eye(3)
-    fused = inverse_covariance(stacked["mean"], diagonal)
+    diagonal = np.stack(variance, axis=1)[..., None] * np.eye(3)
+    fused = inverse_covariance(np.stack(mean, axis=1), diagonal)
     return Fusion(fused.mean, np.diagonal(fused.covariance, axis1=1, axis2=2).copy())

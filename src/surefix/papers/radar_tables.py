@@ -19,7 +19,7 @@ from surefix.papers.radar_breakdown import (
     settings,
     survived,
 )
-from surefix.papers.radar_methods import OURS, PRINTED, Cartesian, Fusion
+from surefix.papers.radar_methods import COUNTED, OURS, PRINTED, Cartesian, Fusion
 from surefix.simulate.radar import RadarFlight
 from surefix.types import BoolArray, FloatArray
 
@@ -75,7 +75,9 @@ def figures_of_run(
         "manoeuvre_m": {n: _size(x - truth, parts.manoeuvre) for n, x in one.items()},
         "straight_m": {n: rmse((x - truth)[parts.straight][:, 1:]) for n, x in one.items()},
         "registration": {n: _bias_error(flight, each) for n, each in bias.items()},
-        "fusion_m": {n: _fused(each.position - truth, parts) for n, each in both.items()},
+        "fusion_m": {
+            n: _fused(each.position - truth, parts) for n, each in both.items() if n != COUNTED
+        },
         "nees": {
             n: _nees(each, truth, parts)
             for n, each in both.items()
