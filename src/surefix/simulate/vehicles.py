@@ -20,6 +20,7 @@ _FAST = (25.0, 45.0)  # σ per interval, speed of the boat between turns
 _LEG = (15.0, 60.0)  # intervals between its turns …
 _TURN = (3.0, 10.0)  # … each of which takes as long …
 _RATE = (0.15, 0.4)  # … at so many rad per interval
+_WAVE = 1.2  # σ, root mean square of the heights of the waves of a swell
 _FINE = 16  # steps of the boat's and the buoy's motion in an interval
 
 
@@ -76,7 +77,7 @@ def _model(rng: np.random.Generator, time: FloatArray, axes: int, agility: float
 
 
 def _boat(rng: np.random.Generator, fine: FloatArray) -> FloatArray:
-    """Velocity: straight legs, turns at a steady rate to either side, a slow heave."""
+    """Velocity: straight legs, turns at a steady rate to either side, a swell."""
     rate = np.zeros_like(fine)
     begin = 0.0
     while begin < fine[-1]:
@@ -87,25 +88,35 @@ def _boat(rng: np.random.Generator, fine: FloatArray) -> FloatArray:
         begin = end
     course = rng.uniform(0.0, 2.0 * np.pi) + np.cumsum(rate) / _FINE
     speed = rng.uniform(*_FAST)
-    heave = 0.5 * np.sin(2.0 * np.pi * fine / 12.0 + rng.uniform(0.0, 2.0 * np.pi))
-    return np.column_stack((speed * np.sin(course), speed * np.cos(course), heave))
+    return np.column_stack(
+        (speed * np.sin(course), speed * np.cos(course), _swell(rng, fine, 1).velocity[:, 0])
+    )
 
 
-def _buoy(rng: np.random.Generator, fine: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Position and velocity: a slow drift in circles, and a swell of several waves."""
+def _buoy(rng: np.random.Generator, fine: FloatArray) -> Path:
+    """Drift slowly in circles, in a swell."""
     spin = 2.0 * np.pi / 700.0
     phase = spin * fine + rng.uniform(0.0, 2.0 * np.pi)
+    none = np.zeros_like(fine)
     drift = rng.normal(0.0, 0.3, 3) * np.array([1.0, 1.0, 0.0])
-    circle = 0.4 / spin * np.column_stack((np.sin(phase), np.cos(phase), np.zeros_like(fine)))
-    position = drift * fine[:, None] + circle
-    velocity = drift + 0.4 * np.column_stack((np.cos(phase), -np.sin(phase), np.zeros_like(fine)))
+    position = drift * fine[:, None] + 0.4 / spin * np.column_stack(
+        (np.sin(phase), np.cos(phase), none)
+    )
+    velocity = drift + 0.4 * np.column_stack((np.cos(phase), -np.sin(phase), none))
+    swell = _swell(rng, fine, 3)
+    return Path(position + swell.position, velocity + swell.velocity)
+
+
+def _swell(rng: np.random.Generator, fine: FloatArray, axes: int) -> Path:
+    """Six waves of 8 … 16 intervals, each of its own height along every axis."""
+    position, velocity = np.zeros((len(fine), axes)), np.zeros((len(fine), axes))
     for _ in range(6):
         pulse = 2.0 * np.pi / rng.uniform(8.0, 16.0)
-        wave = pulse * fine[:, None] + rng.uniform(0.0, 2.0 * np.pi, 3)
-        height = 1.2 * rng.standard_normal(3)
-        position = position + height * np.sin(wave)
-        velocity = velocity + height * pulse * np.cos(wave)
-    return position, velocity
+        phase = pulse * fine[:, None] + rng.uniform(0.0, 2.0 * np.pi, axes)
+        height = _WAVE * rng.standard_normal(axes)
+        position += height * np.sin(phase)
+        velocity += height * pulse * np.cos(phase)
+    return Path(position, velocity)
 
 
 def _integral(velocity: FloatArray) -> FloatArray:
