@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from filters.worlds import NEVER, PLAIN, ROBUST, epochs_of, motion_of, straight, world
-from surefix.filters.offline import _reversed, offline
+from surefix.filters.offline import backward, offline
 from surefix.filters.records import Recovery
 from surefix.filters.rts import leave_one_out, smooth
 from surefix.filters.track import filter_track, start
@@ -175,11 +175,11 @@ def test_seen_backwards_positions_and_velocities_agree():
     """Without noise the filter of the reversed series finds hardly an innovation."""
     _, epochs, motion = straight(0, 50, position=1e-9, velocity=1e-9)
     epochs = epochs._replace(variance=np.ones_like(epochs.variance))
-    back = _reversed(motion, epochs)
+    back = backward(motion, epochs)
     assert (np.diff(back.time) > 0.0).all()
     out = filter_track(motion, PLAIN, NEVER, back, start(motion, NEVER))[1]
     assert np.abs(out.standardised[1:]).max() < 0.02  # the velocity prior lingers
-    twice = _reversed(motion, back)
+    twice = backward(motion, back)
     np.testing.assert_array_equal(twice.z, epochs.z)
     np.testing.assert_array_equal(twice.time, epochs.time)
 

@@ -42,6 +42,7 @@ def from_filtered(filtered: Filtered) -> Estimate:
         filtered.standardised,
         filtered.jump,
         filtered.since,
+        np.zeros(len(filtered.jump), np.int64),
     )
 
 

@@ -157,8 +157,7 @@ class Estimate(NamedTuple):
     jump, since
         (n,) bit mask of groups that restarted here, and (n, groups) when the run began.
     run
-        (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none,
-        empty from a filter that knows no runs.
+        (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none.
     """
 
     mean: FloatArray
@@ -168,4 +167,4 @@ class Estimate(NamedTuple):
     standardised: FloatArray
     jump: IntArray
     since: FloatArray
-    run: IntArray = np.empty(0, np.int64)
+    run: IntArray

@@ -128,7 +128,9 @@ def clean_channel(
         np.ones(n, np.bool_),
         state.filter,
     )
-    judged = verdicts(estimated, epochs, state.motion, status)
+    judged = verdicts(
+        estimated, epochs, state.motion, status, (0,), several=state.prior is not None
+    )
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
     known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)

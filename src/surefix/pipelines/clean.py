@@ -224,7 +224,9 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
             ~auxiliary,
             session.filter,
         )
-        judged = _all_axes(verdicts(found, epochs, setup.motion, known, setup.axes), setup.axes)
+        several = setup.prior is not None
+        judged = verdicts(found, epochs, setup.motion, known, setup.axes, several=several)
+        judged = _all_axes(judged, setup.axes)
         judged = without_position(
             judged, np.concatenate([lost, np.zeros(len(grid), np.bool_)])[order]
         )

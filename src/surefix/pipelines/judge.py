@@ -105,7 +105,13 @@ def estimate(
 
 
 def verdicts(
-    found: Estimate, epochs: Epochs, motion: Motion, status: Status, axes: tuple[int, ...] = (0,)
+    found: Estimate,
+    epochs: Epochs,
+    motion: Motion,
+    status: Status,
+    axes: tuple[int, ...],
+    *,
+    several: bool,
 ) -> Verdicts:
     """Give every row its verdict.
 
@@ -120,6 +126,8 @@ def verdicts(
         What was known before.
     axes
         Which of x, y, z the filter runs on.
+    several
+        Whether weights are probabilities under several hypotheses.
     """
     n, d = len(epochs.time), motion.axes
     groups = int(motion.group[:d].max()) + 1
@@ -128,7 +136,6 @@ def verdicts(
     smallest = _fold(np.fmin, weight)
     verdict = np.full(n, int(Verdict.USED))
     verdict[smallest < _WHOLE] = Verdict.DOWNWEIGHTED
-    several = len(found.run) > 0
     leading = weight[:, 0].copy()
     for g in range(1, groups):
         beside = several and axes[g] < 2
