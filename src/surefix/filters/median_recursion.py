@@ -11,8 +11,8 @@ Medians reach up to the sample before, so v̂, ŷ and the gate are a prediction.
 
 ``printed``
     First differences, and every sample enters the medians. The median of 38 first differences of
-    white noise σ is wrong by about 0.28 σ a sample, and so is every step of dead reckoning: after a
-    few rejected samples on end the state has left its own gate.
+    white noise σ is wrong by about 0.16 σ a sample, and so is every step of dead reckoning: after
+    some rejected samples on end the state has left its own gate.
 ``repeated-median``
     The velocity is the repeated median of the slopes between all pairs of samples
     (`surefix.robust.repeated_median`): breakdown point one half, at O(m²) a sample.

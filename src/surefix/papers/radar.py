@@ -202,8 +202,8 @@ def _findings(options: RadarOptions, made: Mapping[str, Table]) -> tuple[str, ..
         f"{mean(fused, 'usual noise', 'noisy'):.1f} m, by residual scale "
         f"{mean(fused, 'residual scale', 'noisy'):.1f} m.",
         f"{ROBUST}, errs in Y by {mean(burst, ROBUST, 0):.1f} m around the burst, "
-        f"{mean(legs, ROBUST, 0):.1f} m on the straight legs and {mean(swerve, ROBUST, 0):.1f} m in "
-        f"the manoeuvre, and survives {mean(common, ROBUST, '50'):.0f} % of the bursts of 50.",
+        f"{mean(legs, ROBUST, 0):.1f} m on the straight legs and {mean(swerve, ROBUST, 0):.1f} m "
+        f"in the manoeuvre, and survives {mean(common, ROBUST, '50'):.0f} % of the bursts of 50.",
         f"σ²min as printed is {1.0 / mean('nees', 'residual scale', 'straight'):.1f} times the "
         "squared error of the fused track on the straight legs; with the smoothing counted, "
         f"{1.0 / mean('nees', COUNTED, 'straight'):.2f} times.",
