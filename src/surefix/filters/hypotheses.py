@@ -102,6 +102,8 @@ class Bank(NamedTuple):
         (k,) fixes of the run so far.
     faulty
         (k,) bit mask of the sensors whose last velocity was wrong.
+    slip
+        (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -117,6 +119,7 @@ class Bank(NamedTuple):
     opened: FloatArray
     length: IntArray
     faulty: IntArray
+    slip: FloatArray
     announced: FloatArray
 
 
@@ -171,5 +174,6 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full(most, np.nan),
         np.zeros(most, np.int64),
         np.zeros(most, np.int64),
+        np.zeros((most, d)),
         np.full(1, np.nan),
     )

@@ -28,6 +28,7 @@ def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> N
             for l in range(n):
                 to.covariance[i, a, j, l] = source.covariance[k, a, j, l]
         to.seen[i, a] = source.seen[k, a]
+        to.slip[i, a] = source.slip[k, a]
     to.began[i] = source.began[k]
     to.run[i] = source.run[k]
     to.opened[i] = source.opened[k]

@@ -17,6 +17,7 @@ BRANCHES = 12
 """Candidates that a hypothesis can have at one epoch, at most."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
+_ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset to confirm a jump
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -49,6 +50,12 @@ def wrapped(nu: float, period: float) -> float:
 
 
 @helper
+def _log_sum(a: float, b: float) -> float:
+    """Logarithm of the sum of two exponentials."""
+    return max(a, b) + math.log1p(math.exp(-abs(a - b)))
+
+
+@helper
 def velocity_branches(
     motion: Motion,
     prior: Prior,
@@ -67,6 +74,7 @@ def velocity_branches(
         inside = 0.0
         square = 0.0
         scale = 0.0
+        alike = 0.0
         seen = 0
         for a in range(d):
             c = d + a
@@ -78,9 +86,15 @@ def velocity_branches(
             wide = prior.spread[c] * prior.spread[c] + S
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
+            change = nu - bank.slip[k, a]
+            alike -= 0.5 * (change * change / (S + variance[c]) + math.log(S + variance[c]))
+            alike -= 0.5 * _LOG_2PI
             seen += 1
-        out = prior.again if (bank.faulty[k] >> sensor) & 1 else prior.velocity
         outside = log_wild(square, scale, seen)
+        out = prior.velocity
+        if (bank.faulty[k] >> sensor) & 1:
+            out = prior.again
+            outside = _log_sum(outside + math.log(1.0 - _ALIKE), alike + math.log(_ALIKE))
         if forced[d] != 0.0:
             score[total] = bank.weight[k] + inside + math.log1p(-out)
             parent[total], code[total] = k, 0

@@ -71,6 +71,9 @@ def _apply_velocity(
     d, bit = motion.axes, 1 << sensor
     if out:
         bank.faulty[i] |= bit
+        for a in range(d):
+            if not math.isnan(z[d + a]):
+                bank.slip[i, a] = z[d + a] - bank.mean[i, a, 1]
         return
     bank.faulty[i] &= ~bit
     for a in range(d):
