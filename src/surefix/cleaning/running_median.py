@@ -142,7 +142,7 @@ def middle(window: SortedWindow) -> float:
     below = float(window.value[window.heap[0]])
     if low > high:
         return below
-    return 0.5 * below + 0.5 * float(window.value[window.heap[len(window.heap) - 1]])
+    return 0.5 * (below + float(window.value[window.heap[len(window.heap) - 1]]))
 
 
 @helper
