@@ -3,7 +3,7 @@
 The oracle knows the true noise of every sensor, which components are gross errors (they are left
 out, and nothing else), and at which fix the track truly jumps. Where the motion is that of the
 model it knows its density too; where it is not, it takes the model and the density that bring it
-nearest to the truth.
+nearest to the truth on each axis.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ LAG_INTERVALS: Final = 40
 """Future seen in the lagged mode, intervals between fixes."""
 
 _NOTHING: Final = 1e3  # σ per interval: a velocity nothing is known about
-_SPAN: Final = (-7.0, 5.0)  # logarithms of √q, in σ and intervals, that are tried
+_COARSE: Final = tuple(range(-6, 7))  # logarithms of √q over the world's that are tried, and …
+_FINE: Final = (-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75)  # … about the best of them
 _BEGUN: Final = 20  # rows from which its own error counts in the choice of the motion
 _STEP: Final = 1e-9  # share of the lag by which it is longer, for rounding
 
@@ -55,31 +56,27 @@ def oracle(trial: Trial, mode: Mode) -> Oracle:
         How much of the future may be used.
     """
     if trial.scenario.vehicle == "model":
-        return _estimate(trial, _motion(trial, 2, trial.world.process), mode)
-    return min((_best(trial, order, mode) for order in (2, 3)), key=lambda each: _rms(trial, each))
+        return _estimate(trial, _motion(trial, 2, np.full(trial.world.axes, 1.0)), mode)
+    even, steady = (_best(trial, order, mode) for order in (2, 3))
+    better = _rms(trial, even) <= _rms(trial, steady)
+    return Oracle(*(np.where(better, one, two) for one, two in zip(even, steady, strict=True)))
 
 
 def _best(trial: Trial, order: int, mode: Mode) -> Oracle:
-    """Estimate with the density that gives the smallest error."""
-    from scipy.optimize import minimize_scalar
+    """Estimate with the density that gives the smallest error, on each axis its own."""
 
-    world = trial.world
-    unit = world.sigma_m / world.interval_s ** (order - 0.5)
+    def of(logarithm: FloatArray) -> Oracle:
+        return _estimate(trial, _motion(trial, order, np.exp(logarithm)), mode)
 
-    def of(logarithm: float) -> Oracle:
-        return _estimate(trial, _motion(trial, order, unit * float(np.exp(logarithm))), mode)
-
-    found = minimize_scalar(
-        lambda logarithm: _rms(trial, of(logarithm)),
-        bounds=_SPAN,
-        method="bounded",
-        options={"xatol": 0.05},
-    )
-    return of(found.x)
+    best = np.zeros(trial.world.axes)
+    for steps in (_COARSE, _FINE):
+        errors = [_rms(trial, of(best + step)) for step in steps]
+        best = best + np.array(steps)[np.argmin(errors, axis=0)]
+    return of(best)
 
 
-def _rms(trial: Trial, found: Oracle) -> float:
-    return float(np.sqrt(((found.position - trial.position)[_BEGUN:] ** 2).mean()))
+def _rms(trial: Trial, found: Oracle) -> FloatArray:
+    return np.asarray(np.sqrt(((found.position - trial.position)[_BEGUN:] ** 2).mean(axis=0)))
 
 
 def _estimate(trial: Trial, motion: Motion, mode: Mode) -> Oracle:
@@ -98,9 +95,11 @@ def _estimate(trial: Trial, motion: Motion, mode: Mode) -> Oracle:
     return Oracle(found.mean[:, :d], found.sigma[:, :d])
 
 
-def _motion(trial: Trial, order: int, process: float) -> Motion:
-    d = trial.world.axes
-    return Motion(order, d, np.full(d, process**2), by_axis(d), 2 * d, 0.0)
+def _motion(trial: Trial, order: int, factor: FloatArray) -> Motion:
+    """Motion whose √q is the world's, on each axis times a factor of its own."""
+    d, world = trial.world.axes, trial.world
+    root = factor * world.process / world.interval_s ** (order - 2)
+    return Motion(order, d, root**2, by_axis(d), 2 * d, 0.0)
 
 
 def _epochs(trial: Trial) -> Epochs:
