@@ -91,10 +91,23 @@ def clean(
     ] = None,
     method: Annotated[
         Literal[
-            "multi-hypothesis", "kalman", "gate", "huber", "igg1", "igg3", "igg3-yang", "student-t"
+            "multi-hypothesis",
+            "kalman",
+            "gate",
+            "huber",
+            "igg1",
+            "igg3",
+            "igg3-yang",
+            "student-t",
+            "cipra-romera",
+            "53h",
+            "hampel",
+            "median",
         ]
         | None,
-        typer.Option(help="Several hypotheses, or one with a robust loss; default igg3."),
+        typer.Option(
+            help="Several hypotheses, one with a robust loss, or a cleaner before it; default igg3."
+        ),
     ] = None,
     model: Annotated[
         Literal["auto", "cv", "ca"] | None,

@@ -56,10 +56,11 @@ class CompareOptions:
 
     def __post_init__(self) -> None:
         _distinct("methods", self.methods)
-        for method in self.methods:
-            CleanOptions(method=method)
         _known("scenario", self.scenarios, tuple(SCENARIOS))
         _known("mode", self.modes, get_args(Mode))
+        for method in self.methods:
+            for mode in self.modes:
+                CleanOptions(method=method, mode=mode)
         for name, least in (("seed", 0), ("runs", 1), ("epochs", 200), ("jobs", 1)):
             if getattr(self, name) < least:
                 raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {least}")

@@ -63,6 +63,7 @@ def median_recursion(
     gate: float = 4.0,
     longest_burst: int = 50,
     floor: float = 0.0,
+    period: float = 0.0,
 ) -> MedianRecursion:
     """Settle the settings.
 
@@ -87,6 +88,8 @@ def median_recursion(
         forms need no restart: after a jump their scale grows until they follow.
     floor
         Least scale, in the unit of the samples: half a digit of quantised samples, say.
+    period
+        One turn for angles, else 0. Estimates of angles go on beyond a turn.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def median_recursion(
         )
     code = FORMS.index(form)
     promise = longest_burst if form == "feedback" else 0
-    return MedianRecursion(code, order, window, lag, gain, gate, promise, floor)
+    return MedianRecursion(code, order, window, lag, gain, gate, promise, floor, period)
 
 
 def start_medians(options: MedianRecursion, axes: int = 1) -> tuple[MedianState, ...]:

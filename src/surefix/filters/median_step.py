@@ -38,6 +38,8 @@ class MedianRecursion(NamedTuple):
         Rejected samples on end that are survived; 0 never restarts.
     floor
         Least scale s, in the unit of the samples.
+    period
+        One turn for angles, else 0: samples are laid beside the estimate.
     """
 
     form: int
@@ -48,6 +50,7 @@ class MedianRecursion(NamedTuple):
     gate: float
     longest_burst: int
     floor: float
+    period: float = 0.0
 
 
 class MedianState(NamedTuple):
@@ -124,6 +127,8 @@ def run(
         if missing and tally[0] == 0:
             continue
         at = tally[0]
+        if options.period > 0.0 and at > 0:
+            y -= options.period * np.rint((y - level[0]) / options.period)
         raw[at % m] = y
         tally[0] += 1
         if at < m:

@@ -165,11 +165,24 @@ def _reweighted(
     for g in range(motion.groups):
         size = np.isfinite(epochs.z[:, motion.group == g]).sum(axis=1)
         nis = (found.distance[:, g] * _scale(motion, loss, g)) ** 2
+        if loss.by_noise:
+            nis = _over_noise(motion, epochs, found, g)
         for m in np.unique(size[size > 0]):
             rows = (size == m) & np.isnan(epochs.fixed[:, g])
             judged = weights(nis[rows], int(m), loss)
             fixed[rows, g] = np.where(np.isnan(judged), fixed[rows, g], judged)
     return fixed
+
+
+def _over_noise(motion: Motion, epochs: Epochs, found: Estimate, c: int) -> FloatArray:
+    """Squared residuals of one component from the smoothed track, over its noise variance.
+
+    Weights of these lead to the minimum of the squares of prediction and Huber's ρ of observation.
+    """
+    off = epochs.z[:, c] - found.mean[:, c]
+    if motion.period > 0.0 and c == 0:
+        off -= motion.period * np.rint(off / motion.period)
+    return np.asarray(off**2 / epochs.variance[:, c])
 
 
 def needed_jumps(motion: Motion, epochs: Epochs, jump: IntArray, smoothed: Smoothed) -> IntArray:

@@ -348,7 +348,10 @@ def run(
                 nis = out.nis[k, g]
                 w = _student_weight(observed, B, variance, nu, index, C, e, y, loss.k0, nis)
             else:
-                w = weight(out.sigma[k, g], loss.code, loss.k0, loss.k1)
+                v = out.sigma[k, g]
+                if loss.by_noise:  # about an unknown prediction it says nothing
+                    v = 0.0 if unknown else abs(nu[index[0]]) / math.sqrt(variance[index[0]])
+                w = weight(v, loss.code, loss.k0, loss.k1)
             if w < _REJECTED and loss.code != 0:
                 _remember(motion, state, g, time, nu)
                 if _due(recovery, state, g, time):

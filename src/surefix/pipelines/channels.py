@@ -211,5 +211,5 @@ def _settle(
         lag=float(options.lag_s or _LAG_VALUES * interval),
         sigma=sigma,
         noise=noise,
-        filter=begin(motion, recovery, prior),
+        filter=begin(options, motion, recovery, prior),
     )

@@ -197,7 +197,8 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
         head = _head(options)
         setup = settle(take_rows(used, head), (status.verdict < 0)[head], session.sensors, options)
         session.setup = setup
-        session.filter = begin(setup.motion, setup.recovery, setup.prior) if setup.axes else None
+        if setup.axes:
+            session.filter = begin(options, setup.motion, setup.recovery, setup.prior)
         events += [*setup.events, *_idle_events(session)]
     position, velocity = localise(used, setup.frame, setup.origin)
     offset = padded(setup.height_offset, len(session.sensors))[rows.fixes.sensor]

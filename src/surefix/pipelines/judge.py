@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.filters.deciding import Decided, decide, look_ahead
 from surefix.filters.hypotheses import Bank, Prior, no_hypotheses
 from surefix.filters.modes import lagged, realtime
 from surefix.filters.multi_hypothesis_modes import (
@@ -37,13 +38,18 @@ _NONE = 0.02  # a weight up to here counts as rejected
 _DOUBTFUL = 0.5  # … and a probability below this, where a weight is one
 
 
-FilterState = TrackState | Bank
-"""What a filter remembers: one hypothesis or several."""
+FilterState = TrackState | Decided | Bank
+"""What a filter remembers: one hypothesis, perhaps with a cleaner before it, or several."""
 
 
-def begin(motion: Motion, recovery: Recovery, prior: Prior | None) -> FilterState:
+def begin(
+    options: CleanOptions, motion: Motion, recovery: Recovery, prior: Prior | None
+) -> FilterState:
     """State of a filter that has seen nothing."""
-    return start(motion, recovery) if prior is None else no_hypotheses(motion)
+    if prior is not None:
+        return no_hypotheses(motion)
+    track = start(motion, recovery)
+    return track if options.decider is None else Decided(track)
 
 
 class Status(NamedTuple):
@@ -96,6 +102,13 @@ def estimate(
             return state, offline_hypotheses(motion, prior, epochs)
         assert isinstance(state, Bank)
         return realtime_hypotheses(motion, prior, epochs, state)
+    if isinstance(state, Decided):
+        assert options.decider is not None
+        series, epochs = decide(options.decider, motion, recovery, epochs, state.series)
+        lag = max(lag - look_ahead(options.decider, motion, epochs), 0.0)
+        track, found = estimate(options, motion, recovery, prior, lag, epochs, wanted, state.track)
+        assert isinstance(track, TrackState)
+        return Decided(track, series), found
     assert isinstance(state, TrackState)
     if options.mode == "realtime":
         return realtime(motion, options.loss, recovery, epochs, state)
@@ -131,6 +144,7 @@ def verdicts(
     """
     n, d = len(epochs.time), motion.axes
     groups = int(motion.group[:d].max()) + 1
+    apart = groups == d  # each axis is judged by itself
     weight = np.minimum(found.weight[:, :groups], 1.0)
     distance = found.distance[:, :groups]
     smallest = _fold(np.fmin, weight)
@@ -138,7 +152,7 @@ def verdicts(
     verdict[smallest < _WHOLE] = Verdict.DOWNWEIGHTED
     leading = weight[:, 0].copy()
     for g in range(1, groups):
-        beside = several and axes[g] < 2
+        beside = apart and axes[g] < 2
         best = np.fmax(leading, weight[:, g]) if beside else leading
         leading = np.where(np.isnan(best), weight[:, g], best)
     verdict[leading < _DOUBTFUL if several else leading <= _NONE] = Verdict.REJECTED
@@ -149,7 +163,7 @@ def verdicts(
         low = np.nan_to_num(weight, nan=1.0) < (_DOUBTFUL if several else _WHOLE)
         part = low.any(axis=1) & ~low.all(axis=1) & (np.isfinite(weight).sum(axis=1) > 1)
         reason[part] = Reason.AXIS_OFF
-        detail[part] = (low[part] * _bits(axes, several)).sum(axis=1)
+        detail[part] = (low[part] * _bits(axes, apart)).sum(axis=1)
     if several:
         run = (found.run > 0) & (verdict == Verdict.REJECTED)
         reason[run], detail[run] = Reason.RUN, found.run[run]
@@ -172,9 +186,9 @@ def verdicts(
     )
 
 
-def _bits(axes: tuple[int, ...], several: bool) -> IntArray:
+def _bits(axes: tuple[int, ...], apart: bool) -> IntArray:
     """Bits of `Reason.AXIS_OFF` for each group: blocks or single axes, but for both the same."""
-    if several:
+    if apart:
         return np.array([1 << axis for axis in axes])
     kinds = list(dict.fromkeys(axis == 2 for axis in axes))
     return np.array([4 if kind else 3 for kind in kinds])

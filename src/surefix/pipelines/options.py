@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 from surefix.errors import OptionsError
+from surefix.filters.deciding import AHEAD, THRESHOLDS, Decider
 from surefix.models.motion import MODELS
 from surefix.robust.loss import LOSSES, Loss, loss_named
 
@@ -17,8 +18,9 @@ __all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Mode", "options_from"
 Mode = Literal["realtime", "lagged", "offline"]
 
 MULTI_HYPOTHESIS = "multi-hypothesis"
-METHODS = (MULTI_HYPOTHESIS, *LOSSES)
-"""Names of the estimators: several hypotheses, or one with a robust loss."""
+_CIPRA_ROMERA = "cipra-romera"
+METHODS = (MULTI_HYPOTHESIS, *LOSSES, _CIPRA_ROMERA, *THRESHOLDS)
+"""Names of the estimators: several hypotheses, one with a robust loss, or a cleaner before it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +33,14 @@ class CleanOptions:
         ``realtime``: each fix is judged and estimated from the past alone. ``lagged``: from the
         past and ``lag_s`` seconds of future. ``offline``: from the whole log.
     method
-        The estimator, one of ``METHODS``: several hypotheses, or one with a robust loss.
+        The estimator, one of ``METHODS``: several hypotheses, one with a robust loss, or one with a
+        cleaner that decides before it. 53H and Hampel look ahead: not in real time.
     model
         Motion model: ``cv`` constant velocity, ``ca`` constant acceleration, ``auto`` the likelier
         of the two (``cv`` if ``process`` is given, for their units differ).
     k0, k1
-        Constants of the loss, standard deviations (Student-t: k0 is ν).
+        Constants of the loss, standard deviations (Student-t: k0 is ν); k0 is the threshold of a
+        cleaner.
     false_alarm
         Share of good fixes that ``gate`` may reject.
     lag_s
@@ -104,6 +108,16 @@ class CleanOptions:
             None,
         ):
             raise OptionsError(f"k0 or k1 with method {self.method}", "a method that has them")
+        if self.k1 is not None and self.method in (_CIPRA_ROMERA, *THRESHOLDS):
+            raise OptionsError(f"k1 with method {self.method}", "k0 alone")
+        if self.method in THRESHOLDS:
+            _positive("k0", self.k0)
+        if AHEAD.get(self.method, 0) > 0 and self.mode == "realtime":
+            raise OptionsError(
+                f"method {self.method}, which looks ahead, in mode realtime",
+                "mode lagged or offline",
+                "method median decides from the past",
+            )
         _number("false_alarm", self.false_alarm)
         if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
@@ -113,10 +127,25 @@ class CleanOptions:
 
     @property
     def loss(self) -> Loss:
-        """The robust loss these options ask for; none for several hypotheses."""
-        if self.method == MULTI_HYPOTHESIS:
+        """The robust loss these options ask for; none for several hypotheses or a cleaner."""
+        if self.method == MULTI_HYPOTHESIS or self.decider is not None:
             return loss_named("kalman")
+        if self.method == _CIPRA_ROMERA:
+            return loss_named("huber", k0=self.k0)._replace(by_noise=1)
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
+
+    @property
+    def decider(self) -> Decider | None:
+        """The cleaner that decides before the filter; None for the other methods."""
+        usual = THRESHOLDS.get(self.method)
+        if usual is None:
+            return None
+        return Decider(self.method, usual if self.k0 is None else float(self.k0))
+
+    @property
+    def by_axis(self) -> bool:
+        """Whether each axis of a fix is judged by itself, and not the horizontal ones together."""
+        return self.method not in LOSSES
 
     @property
     def models(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surefix.errors import OptionsError
+from surefix.filters.deciding import AHEAD
 from surefix.filters.hypotheses import Prior
 from surefix.filters.noise import speed_scale
 from surefix.filters.records import Motion, Recovery
@@ -43,8 +44,8 @@ class Setup:
     axes
         Which of x, y, z are observed.
     motion, model, recovery
-        Of the filter. Groups are horizontal and vertical blocks, single axes with several
-        hypotheses. The motion model by its name.
+        Of the filter. Groups are horizontal and vertical blocks with a loss, else single axes. The
+        motion model by its name.
     prior
         Of several hypotheses; None for a loss.
     interval
@@ -105,7 +106,7 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
     Raises
     ------
     OptionsError
-        A sensor is named that the log does not have.
+        A sensor is named that the log does not have, or the lag is too short for the method.
     """
     unknown = sorted({*options.sensor_sigma, *options.sensor_delay_s} - set(sensors))
     if unknown:
@@ -117,11 +118,17 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
     position[:, 2] -= np.where(rows.auxiliary, 0.0, offset[rows.fixes.sensor])
     axes = tuple(i for i in range(3) if np.isfinite(position[:, i]).any())
     interval = _interval(rows, position)
+    least = AHEAD.get(options.method, 0) * interval
+    if options.lag_s is not None and options.lag_s < least:
+        raise OptionsError(
+            f"a lag of {options.lag_s:g} s with method {options.method}",
+            f"at least {least:.3g} s, the time of the fixes it looks ahead",
+        )
     several = options.method == MULTI_HYPOTHESIS
     after = float(options.recovery_s or (_RUN_FIXES if several else _RECOVERY_FIXES) * interval)
     speed = max([*(_speed(rows, position, i) for i in axes), 1e-3])
     figures = settle_noise(rows, position, velocity, axes, sensors, options, speed, after)
-    group = by_axis(len(axes)) if several else by_block(axes)
+    group = by_axis(len(axes)) if options.by_axis else by_block(axes)
     return Setup(
         frame=frame,
         origin=origin,

@@ -60,6 +60,9 @@ class Loss(NamedTuple):
         How much longer the Mahalanobis distance over two or three axes is than one standard
         deviation of one axis at the same tail probability: distances are divided by it, so that k₀
         and k₁ mean the same for a block of axes as for one.
+    by_noise
+        1: the track filter takes v over the root of the noise variance alone, as Cipra and Romera
+        do (paper 002, eqs 19), and not of the innovation's. Groups are single components then.
     """
 
     code: int
@@ -67,6 +70,7 @@ class Loss(NamedTuple):
     k1: float
     scale2: float
     scale3: float
+    by_noise: int = 0
 
 
 LOSSES: dict[str, LossCode] = {
