@@ -16,7 +16,10 @@ __all__ = [
     "MOST",
     "MOST_SENSORS",
     "OPEN",
+    "POOR",
+    "POOR_WEIGHT",
     "VELOCITY_OUT",
+    "VELOCITY_POOR",
     "Bank",
     "Found",
     "Prior",
@@ -37,6 +40,11 @@ CONTINUE: Final = 16
 DROP: Final = 32
 COMMIT: Final = 64
 VELOCITY_OUT: Final = 128
+POOR: Final = 256
+VELOCITY_POOR: Final = 512
+
+POOR_WEIGHT: Final = 0.25
+"""Weight of an observation that belongs to the track but is twice as noisy as usual."""
 
 
 class Prior(NamedTuple):
@@ -48,6 +56,8 @@ class Prior(NamedTuple):
         Probability that a fix is wrong by itself, on all its axes.
     partial
         Probability that only some of its axes are.
+    poor
+        Probability that a fix or a velocity is twice as noisy as usual.
     burst
         Probability that a run of fixes with a common offset begins.
     ending
@@ -65,6 +75,7 @@ class Prior(NamedTuple):
 
     isolated: float
     partial: float
+    poor: float
     burst: float
     ending: float
     longest: float

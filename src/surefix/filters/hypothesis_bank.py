@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import COMMIT, CONTINUE, DROP, OPEN, Bank, Found
+from surefix.filters.hypotheses import COMMIT, CONTINUE, DROP, OPEN, POOR, POOR_WEIGHT, Bank, Found
 from surefix.filters.hypothesis_axis import commit, forget, open_run, update_axis
 from surefix.filters.hypothesis_branches import wrapped
 from surefix.filters.records import Motion
@@ -132,7 +132,9 @@ def apply_position(
             P[0, 0] = variance[a]
             continue
         nu = wrapped(z[a] - m[0], motion.period)
-        if code & OPEN:
+        if code & POOR:
+            update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
+        elif code & OPEN:
             open_run(m, P, n, nu, variance[a])
         elif code & CONTINUE:
             nu = wrapped(nu - m[b], motion.period)

@@ -6,18 +6,39 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import COMMIT, CONTINUE, DROP, OPEN, VELOCITY_OUT, Bank, Prior
+from surefix.filters.hypotheses import (
+    COMMIT,
+    CONTINUE,
+    DROP,
+    OPEN,
+    POOR,
+    POOR_WEIGHT,
+    VELOCITY_OUT,
+    VELOCITY_POOR,
+    Bank,
+    Prior,
+)
 from surefix.filters.records import Motion
 from surefix.jit import helper
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["BRANCHES", "CONFIRMED", "log_wild", "position_branches", "velocity_branches", "wrapped"]
+__all__ = [
+    "BRANCHES",
+    "CONFIRMED",
+    "log_normal",
+    "log_wild",
+    "position_branches",
+    "velocity_branches",
+    "wrapped",
+]
 
 BRANCHES = 12
 """Candidates that a hypothesis can have at one epoch, at most."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
+_POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
+_GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset to confirm a jump
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -50,6 +71,12 @@ def wrapped(nu: float, period: float) -> float:
 
 
 @helper
+def log_normal(nu: float, S: float) -> float:
+    """Log-density of an innovation ν of variance S."""
+    return -0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+
+
+@helper
 def _log_sum(a: float, b: float) -> float:
     """Logarithm of the sum of two exponentials."""
     return max(a, b) + math.log1p(math.exp(-abs(a - b)))
@@ -72,6 +99,7 @@ def velocity_branches(
     d, total = motion.axes, 0
     for k in range(bank.number[0]):
         inside = 0.0
+        poor = 0.0
         square = 0.0
         scale = 0.0
         alike = 0.0
@@ -82,13 +110,13 @@ def velocity_branches(
                 continue
             nu = z[c] - bank.mean[k, a, 1]
             S = bank.covariance[k, a, 1, 1] + variance[c]
-            inside -= 0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+            inside += log_normal(nu, S)
+            poor += log_normal(nu, S + variance[c] * _POORER)
             wide = prior.spread[c] * prior.spread[c] + S
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
             change = nu - bank.slip[k, a]
-            alike -= 0.5 * (change * change / (S + variance[c]) + math.log(S + variance[c]))
-            alike -= 0.5 * _LOG_2PI
+            alike += log_normal(change, S + variance[c])
             seen += 1
         outside = log_wild(square, scale, seen)
         out = prior.velocity
@@ -96,8 +124,10 @@ def velocity_branches(
             out = prior.again
             outside = _log_sum(outside + math.log(1.0 - _ALIKE), alike + math.log(_ALIKE))
         if forced[d] != 0.0:
-            score[total] = bank.weight[k] + inside + math.log1p(-out)
-            parent[total], code[total] = k, 0
+            usual, noisy = inside + math.log(1.0 - prior.poor), poor + math.log(prior.poor)
+            score[total] = bank.weight[k] + _log_sum(usual, noisy) + math.log1p(-out)
+            fair = noisy > usual and math.isnan(forced[d])
+            parent[total], code[total] = k, VELOCITY_POOR if fair else 0
             total += 1
         if not forced[d] > 0.0:
             score[total] = bank.weight[k] + outside + math.log(out)
@@ -143,6 +173,8 @@ def position_branches(
         square = 0.0
         scale = 0.0
         offset = 0.0
+        poor = 0.0
+        distance = 0.0
         unknown = False
         for a in range(d):
             if math.isnan(z[a]):
@@ -155,13 +187,15 @@ def position_branches(
             else:
                 nu = wrapped(z[a] - bank.mean[k, a, 0], motion.period)
                 S = bank.covariance[k, a, 0, 0] + variance[a]
-                inside[a] = -0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+                inside[a] = log_normal(nu, S)
+                poor += log_normal(nu, S + variance[a] * _POORER)
+                distance += nu * nu / S
                 wide[a] = s2 + S
                 wild[a] = nu * nu / wide[a]
                 if bank.run[k] >= 0:
                     S += 2.0 * bank.covariance[k, a, 0, b] + bank.covariance[k, a, b, b]
                     nu = wrapped(nu - bank.mean[k, a, b], motion.period)
-                    offset -= 0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+                    offset += log_normal(nu, S)
             belongs += inside[a]
             square += wild[a]
             scale += 0.5 * math.log(wide[a])
@@ -179,18 +213,20 @@ def position_branches(
             total += 1
             continue
         staying = 1.0 - prior.isolated - prior.partial - prior.burst
+        usual, noisy = belongs + math.log(1.0 - prior.poor), poor + math.log(prior.poor)
         if own:
             score[total] = base + belongs + math.log(prior.ending)
             code[total] = DROP
         else:
-            score[total] = base + belongs + math.log(staying)
-            code[total] = 0
+            score[total] = base + math.log(staying)
+            score[total] += belongs if unknown else _log_sum(usual, noisy)
+            code[total] = POOR if noisy > usual and not unknown else 0
         parent[total] = k
         total += 1
         score[total] = base + outside + math.log(prior.isolated)
         parent[total], code[total] = k, mask
         total += 1
-        if not unknown and (bank.run[k] < 0 or own):
+        if distance > _GROSS and not unknown and (bank.run[k] < 0 or own):
             score[total] = base + outside + math.log(prior.burst)
             parent[total], code[total] = k, OPEN
             total += 1

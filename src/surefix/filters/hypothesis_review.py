@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import Prior
-from surefix.filters.hypothesis_branches import log_wild
+from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
+from surefix.filters.hypothesis_branches import log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
 from surefix.jit import helper, kernel
@@ -20,23 +20,21 @@ from surefix.types import BoolArray, FloatArray
 
 __all__ = ["deleted_residuals", "review"]
 
-_LOG_2PI = math.log(2.0 * math.pi)
-
 
 def deleted_residuals(
     motion: Motion, epochs: Epochs, fixed: FloatArray, smoothed: Smoothed
 ) -> tuple[FloatArray, FloatArray]:
     """Residual of each component from what all others say, and its variance; NaN if unobserved.
 
-    ``e = (z − Hx) R/(R − P)``, ``S = R + P R/(R − P)`` for a component that was used, with x and P
-    smoothed; without the factors for one that was not.
+    ``e = (z − Hx) R̄/(R̄ − P)``, ``S = R + P R̄/(R̄ − P)`` for a component that was used with
+    ``R̄ = R/w``, with x and P smoothed; without the factors for one that was not.
 
     Parameters
     ----------
     motion, epochs
         Model and n observations.
     fixed
-        (n, m) 1 where the component was used.
+        (n, m) weight with which the component was used, or 0.
     smoothed
         Smoothed states of the same epochs.
 
@@ -51,7 +49,8 @@ def deleted_residuals(
     if motion.period > 0.0:
         e[:, 0] -= motion.period * np.rint(e[:, 0] / motion.period)
     R = epochs.variance
-    gain = np.where(fixed > 0.0, R / np.maximum(R - P, 1e-9 * R), 1.0)
+    own = R / np.where(fixed > 0.0, fixed, 1.0)
+    gain = np.where(fixed > 0.0, own / np.maximum(own - P, 1e-9 * own), 1.0)
     residual: FloatArray = e * gain
     spread: FloatArray = np.where(np.isnan(epochs.z), np.nan, R + P * gain)
     return residual, spread
@@ -72,7 +71,7 @@ def review(
     motion, prior, epochs
         As given to the filter.
     fixed
-        (n, m) 1 where the component was used; not modified.
+        (n, m) weight with which the component was used, or 0; not modified.
     smoothed
         What the used ones say.
     locked
@@ -85,15 +84,21 @@ def review(
     """
     residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
     out = fixed.copy()
-    _review(motion.axes, prior, residual, variance, locked, out)
+    _review(motion.axes, prior, residual, variance, epochs.variance, locked, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
 @helper
 def _patterns(
-    axes: int, prior: Prior, inside: FloatArray, wild: FloatArray, wide: FloatArray, seen: int
+    axes: int,
+    prior: Prior,
+    inside: FloatArray,
+    poor: float,
+    wild: FloatArray,
+    wide: FloatArray,
+    seen: int,
 ) -> int:
-    """Bit mask of the axes that are wrong, under the likeliest account of one fix."""
+    """Axes that are wrong under the likeliest account of one fix, as a code of the filter."""
     belongs = 0.0
     square = 0.0
     scale = 0.0
@@ -104,8 +109,10 @@ def _patterns(
             square += wild[a]
             scale += 0.5 * math.log(wide[a])
             mask |= 1 << a
-    best = belongs + math.log(1.0 - prior.isolated - prior.partial)
+    best = belongs + math.log(1.0 - prior.isolated - prior.partial - prior.poor)
     chosen = 0
+    if poor + math.log(prior.poor) > best:
+        best, chosen = poor + math.log(prior.poor), POOR
     score = math.log(prior.isolated) + log_wild(square, scale, seen)
     if score > best:
         best, chosen = score, mask
@@ -131,6 +138,7 @@ def _review(
     prior: Prior,
     residual: FloatArray,
     variance: FloatArray,
+    noise: FloatArray,
     locked: BoolArray,
     out: FloatArray,
 ) -> None:
@@ -141,6 +149,7 @@ def _review(
         for part in range(2):
             seen = 0
             belongs = 0.0
+            poor = 0.0
             square = 0.0
             scale = 0.0
             for a in range(axes):
@@ -150,7 +159,8 @@ def _review(
                 if math.isnan(e):
                     continue
                 seen += 1
-                inside[a] = -0.5 * (e * e / S + math.log(S) + _LOG_2PI)
+                inside[a] = log_normal(e, S)
+                poor += log_normal(e, S + noise[k, c] * (1.0 / POOR_WEIGHT - 1.0))
                 wide[a] = prior.spread[c] * prior.spread[c] + S
                 wild[a] = e * e / wide[a]
                 belongs += inside[a]
@@ -160,12 +170,15 @@ def _review(
                 continue
             if part == 1:
                 outside = log_wild(square, scale, seen) + math.log(prior.velocity)
-                good = belongs + math.log1p(-prior.velocity) >= outside
+                good = belongs + math.log((1.0 - prior.velocity) * (1.0 - prior.poor))
+                fair = poor + math.log((1.0 - prior.velocity) * prior.poor)
+                w = 1.0 if good >= fair else POOR_WEIGHT
                 for a in range(axes):
-                    out[k, axes + a] = 1.0 if good else 0.0
+                    out[k, axes + a] = w if max(good, fair) >= outside else 0.0
                 continue
             if locked[k]:
                 continue
-            mask = _patterns(axes, prior, inside, wild, wide, seen)
+            mask = _patterns(axes, prior, inside, poor, wild, wide, seen)
             for a in range(axes):
-                out[k, a] = 0.0 if (mask >> a) & 1 else 1.0
+                w = POOR_WEIGHT if mask & POOR else 1.0
+                out[k, a] = 0.0 if (mask >> a) & 1 else w

@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.filters.hypotheses import COMMIT, CONTINUE, OPEN, VELOCITY_OUT, Trail
+from surefix.filters.hypotheses import (
+    COMMIT,
+    CONTINUE,
+    OPEN,
+    POOR,
+    POOR_WEIGHT,
+    VELOCITY_OUT,
+    VELOCITY_POOR,
+    Trail,
+)
 from surefix.filters.records import Motion
 from surefix.jit import helper, kernel
 from surefix.types import FloatArray, IntArray
@@ -20,7 +29,8 @@ class Decisions(NamedTuple):
     Parameters
     ----------
     fixed
-        (n, 2·axes) 1 where the component belongs to the track, 0 where it does not.
+        (n, 2·axes) weight of the component: 1 where it belongs to the track, less where it is poor,
+        0 where it does not.
     jump
         (n,) bit mask of the axes whose position jumps before this epoch.
     run
@@ -38,11 +48,26 @@ def undecided(motion: Motion, n: int) -> Decisions:
 
 
 @helper
+def _used(code: int, axis: int, running: bool) -> float:
+    """Weight of an axis of the position."""
+    if running or (code >> axis) & 1:
+        return 0.0
+    return POOR_WEIGHT if code & POOR else 1.0
+
+
+@helper
+def _moved(code: int) -> float:
+    """Weight of the velocity."""
+    if code & VELOCITY_OUT:
+        return 0.0
+    return POOR_WEIGHT if code & VELOCITY_POOR else 1.0
+
+
+@helper
 def _write(decisions: Decisions, k: int, code: int, axes: int, running: bool) -> None:
     for a in range(axes):
-        out = running or (code >> a) & 1
-        decisions.fixed[k, a] = 0.0 if out else 1.0
-        decisions.fixed[k, axes + a] = 0.0 if code & VELOCITY_OUT else 1.0
+        decisions.fixed[k, a] = _used(code, a, running)
+        decisions.fixed[k, axes + a] = _moved(code)
 
 
 @kernel
@@ -69,10 +94,8 @@ def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decis
         inside = running and not committed
         same = decisions.jump[k] == jump
         for a in range(motion.axes):
-            used = 0.0 if inside or (code >> a) & 1 else 1.0
-            moved = 0.0 if code & VELOCITY_OUT else 1.0
-            same = same and decisions.fixed[k, a] == used
-            same = same and decisions.fixed[k, motion.axes + a] == moved
+            same = same and decisions.fixed[k, a] == _used(code, a, inside)
+            same = same and decisions.fixed[k, motion.axes + a] == _moved(code)
         if not same:
             changed = k
         _write(decisions, k, code, motion.axes, inside)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from surefix.filters.hypotheses import Prior, no_hypotheses
+from surefix.filters.hypotheses import POOR_WEIGHT, Prior, no_hypotheses
 from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.multi_hypothesis import filter_hypotheses
@@ -29,7 +29,11 @@ _ROUNDS = 3
 _ENOUGH = 0.02  # relative change of the figures that ends the rounds
 _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
 _LEAST_WILD = 5.0  # … and at least
-_SHARES = {"isolated": (2.0, 50.0), "partial": (0.2, 50.0)}  # prior counts: wrong, and all
+_SHARES = {
+    "isolated": (2.0, 50.0),
+    "partial": (0.2, 50.0),
+    "poor": (0.5, 50.0),
+}  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
 _BRIEFLY = 16  # hypotheses kept meanwhile
@@ -71,6 +75,7 @@ def supposed(
     return Prior(
         isolated=0.05,
         partial=0.005,
+        poor=0.02,
         burst=0.001,
         ending=1.0 / 15.0,
         longest=longest,
@@ -155,7 +160,9 @@ def _counted(prior: Prior, fixed: FloatArray, residual: FloatArray, sigma: float
     seen = np.isfinite(residual[:, :axes])
     out = seen & (fixed[:, :axes] == 0.0)
     whole = out.any(axis=1) & (out == seen).all(axis=1)
-    counts = {"isolated": whole.sum(), "partial": (out.any(axis=1) & ~whole).sum()}
+    poor = (fixed[:, :axes] == POOR_WEIGHT).any(axis=1) & seen.any(axis=1)
+    some = out.any(axis=1) & ~whole
+    counts = {"isolated": whole.sum(), "partial": some.sum(), "poor": poor.sum()}
     total = seen.any(axis=1).sum()
     shares = {
         name: float((counts[name] + wrong) / (total + everything))
@@ -186,6 +193,8 @@ def _likeliest(
     if size == 0:
         return first
 
+    weight = np.where(said.fixed > 0.0, said.fixed, 1.0)
+
     def figures(theta: FloatArray) -> NoiseFigures:
         factor: FloatArray = np.exp(np.clip(theta, -_WIDEST, _WIDEST))
         p, v = first.position.copy(), first.velocity.copy()
@@ -195,7 +204,10 @@ def _likeliest(
 
     def cost(theta: FloatArray) -> float:
         trial = figures(theta)
-        epochs = _epochs(sample, trial)._replace(fixed=said.fixed, jump=said.jump)
+        epochs = _epochs(sample, trial)
+        epochs = epochs._replace(
+            variance=epochs.variance / weight, fixed=said.fixed, jump=said.jump
+        )
         return -_evidence(motion, trial, prior, epochs, 1)
 
     found = minimize(

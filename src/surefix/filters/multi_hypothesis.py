@@ -20,7 +20,10 @@ from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
     OPEN,
+    POOR,
+    POOR_WEIGHT,
     VELOCITY_OUT,
+    VELOCITY_POOR,
     Bank,
     Found,
     Prior,
@@ -66,20 +69,21 @@ def _innovate(motion: Motion, bank: Bank, k: int, z: FloatArray, r: FloatArray, 
 
 @helper
 def _apply_velocity(
-    motion: Motion, bank: Bank, i: int, z: FloatArray, r: FloatArray, out: bool, sensor: int
+    motion: Motion, bank: Bank, i: int, z: FloatArray, r: FloatArray, code: int, sensor: int
 ) -> None:
     d, bit = motion.axes, 1 << sensor
-    if out:
+    if code & VELOCITY_OUT:
         bank.faulty[i] |= bit
         for a in range(d):
             if not math.isnan(z[d + a]):
                 bank.slip[i, a] = z[d + a] - bank.mean[i, a, 1]
         return
     bank.faulty[i] &= ~bit
+    weight = POOR_WEIGHT if code & VELOCITY_POOR else 1.0
     for a in range(d):
         if not math.isnan(z[d + a]):
             m, P = bank.mean[i, a], bank.covariance[i, a]
-            update_axis(m, P, motion.order + 1, 1, False, z[d + a] - m[1], r[d + a])
+            update_axis(m, P, motion.order + 1, 1, False, z[d + a] - m[1], r[d + a] / weight)
 
 
 @helper
@@ -132,11 +136,13 @@ def _judge(motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, out
     for i in range(bank.number[0]):
         w = math.exp(bank.weight[i])
         running = said[i] & (OPEN | CONTINUE) and not said[i] & COMMIT
+        position = w * POOR_WEIGHT if said[i] & POOR else w
+        velocity = w * POOR_WEIGHT if said[i] & VELOCITY_POOR else w
         for a in range(d):
             if not (running or (said[i] >> a) & 1):
-                out.weight[k, a] += w
+                out.weight[k, a] += position
             if not said[i] & VELOCITY_OUT:
-                out.weight[k, d + a] += w
+                out.weight[k, d + a] += velocity
     best = best_of(bank.weight, bank.number[0])
     if said[best] & (OPEN | CONTINUE) and not said[best] & COMMIT:
         out.run[k] = bank.length[best]
@@ -216,7 +222,7 @@ def _run(
                 if stage == 1:
                     apply_position(motion, two, i, z, r, what, time, sensor)
                 else:
-                    _apply_velocity(motion, two, i, z, r, what & VELOCITY_OUT != 0, sensor)
+                    _apply_velocity(motion, two, i, z, r, what, sensor)
             one, two = two, one
             one.number[0] = count
             swaps += 1
@@ -263,7 +269,7 @@ def filter_hypotheses(
     found = _blank(motion, n)
     rows = n if traced else 0
     trail = Trail(
-        np.zeros((rows, most), np.int8), np.zeros((rows, most), np.uint8), np.zeros(rows, np.int8)
+        np.zeros((rows, most), np.int8), np.zeros((rows, most), np.uint16), np.zeros(rows, np.int8)
     )
     swaps = _run(motion, prior, epochs, one, two, found, trail)
     return (two if swaps % 2 else one), found, trail
