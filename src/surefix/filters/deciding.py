@@ -10,8 +10,9 @@ smoother, so that the track and its covariance come from what was really measure
     the noise of the sample; Δ is how much the longer step beside it exceeds the usual one and v the
     usual speed, for x₃ is a mean across the gap. Looks 4 samples ahead.
 ``hampel``
-    |x − med| > k₀ max(s, σ), median and scale s = 1.4826 MAD of a window of 7 samples
-    (`surefix.cleaning.hampel`). Looks 3 samples ahead.
+    |x − med| > k₀ max(s, σ) with med the running median of 7 samples and s = 1.4826 med|x − med|
+    over 7 of them, each from its own median: the MAD of `surefix.cleaning.hampel`, from one median
+    for the whole window, grows with the speed of the vehicle. Looks 6 samples ahead.
 ``median``
     The median recursion with feedback (paper 004; `surefix.filters.median_recursion`): the past
     alone decides. While its window fills, a sample is held against the repeated-median line.
@@ -28,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.cleaning.hampel import MAD_TO_SIGMA, hampel
+from surefix.cleaning.hampel import MAD_TO_SIGMA, hampel, rolling_scale
 from surefix.cleaning.running_median import running_median
 from surefix.cleaning.tukey53h import DELAY, tukey53h
 from surefix.filters.median_recursion import filter_medians, median_recursion, start_medians
@@ -46,7 +47,7 @@ _MISSED = _WINDOW // 2  # usual steps without a sample that it bridges
 
 THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 5.0}
 """Names of the cleaners, and k₀ of each unless it is given."""
-AHEAD = {"53h": DELAY, "hampel": _HAMPEL // 2, "median": 0}
+AHEAD = {"53h": DELAY, "hampel": 2 * (_HAMPEL // 2), "median": 0}
 """How many later samples each of them looks at."""
 
 
@@ -164,24 +165,30 @@ def _all(motion: Motion, epochs: Epochs) -> list[_Series]:
 
 
 def _by_window(decider: Decider, series: _Series, speed: float) -> BoolArray:
-    """What 53H or Hampel would replace."""
+    """What 53H or Hampel's identifier would replace."""
     x, period = series.x, series.period
-    if decider.method == "hampel":
+    hampels = decider.method == "hampel"
+    if hampels:
         found = hampel(x, window=_HAMPEL, n_sigma=decider.k0, period=period)
-        limit = np.where(found.replaced, series.sigma, np.inf)
     else:
         found = tukey53h(x, np.inf, period=period)
-        steps = np.diff(series.time)
-        usual = float(np.median(steps)) if len(steps) else 0.0
-        longer = np.fmax(np.append(steps, 0.0), np.append(0.0, steps)) - usual
-        limit = 0.25 * speed * np.fmax(longer, 0.0)
     off = x - found.estimate
     if period > 0.0:
         off -= period * np.rint(off / period)
-    if decider.method == "53h":
-        scale = MAD_TO_SIGMA * float(np.median(np.abs(off)))
-        limit = np.hypot(np.fmax(scale, series.sigma), limit)
+    if hampels:
+        scale = rolling_scale(off, _HAMPEL, centred=True)
+    else:
+        scale = np.full(len(x), MAD_TO_SIGMA * np.median(np.abs(off)))
+    limit = np.fmax(scale, series.sigma)
+    if not hampels:
+        steps = np.diff(series.time)
+        longer = np.fmax(np.append(steps, 0.0), np.append(0.0, steps))
+        limit = np.hypot(limit, 0.25 * speed * np.fmax(longer - _usual(steps), 0.0))
     return np.asarray(np.abs(off) > decider.k0 * limit)
+
+
+def _usual(steps: FloatArray) -> float:
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def _by_medians(

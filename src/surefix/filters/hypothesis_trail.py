@@ -70,6 +70,17 @@ def _write(decisions: Decisions, k: int, code: int, axes: int, running: bool) ->
         decisions.fixed[k, axes + a] = _moved(code)
 
 
+@helper
+def _untold(decisions: Decisions, first: int) -> bool:
+    """Whether the run that reaches back beyond ``first`` was told as a run, not as a jump."""
+    for k in range(first - 1, -1, -1):
+        if decisions.run[k]:
+            return True
+        if decisions.jump[k]:
+            return False
+    return True
+
+
 @kernel
 def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decisions) -> int:
     """Write what the likeliest hypothesis of epoch ``head`` says of the epochs from ``first`` on.
@@ -90,7 +101,9 @@ def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decis
         if code & COMMIT:
             committed = True
         running = code & (OPEN | CONTINUE) != 0
-        jump = every if committed and (code & OPEN != 0 or k == first) else 0
+        jump = 0
+        if committed and (code & OPEN or (k == first and _untold(decisions, first))):
+            jump = every
         inside = running and not committed
         same = decisions.jump[k] == jump
         for a in range(motion.axes):

@@ -38,6 +38,7 @@ _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
 _BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
+_LEAST = 0.3  # share of the figures begun with that none falls below
 _BEGIN = 3  # epochs whose likelihood is that of the start
 
 
@@ -119,13 +120,17 @@ def learn(
         return Learnt(first, prior)
     motion = _motion(first, axes, order, period)
     figures = _begun(sample, given, first, prior, floor, motion)
+    least = figures._replace(
+        position=np.maximum(figures.position * _LEAST, floor[0]),
+        velocity=np.maximum(figures.velocity * _LEAST, floor[1]),
+    )
     for _ in range(_ROUNDS):
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
         prior = _counted(prior, said.fixed, residual, math.sqrt(float(np.median(epochs.variance))))
         before = figures
-        figures = _likeliest(sample, said, prior, given, before, floor, motion)
+        figures = _likeliest(sample, said, prior, given, before, least, motion)
         if _change(before, figures) < _ENOUGH:
             break
     return Learnt(figures, prior)
@@ -181,7 +186,7 @@ def _likeliest(
     prior: Prior,
     given: NoiseFigures,
     first: NoiseFigures,
-    floor: tuple[float, float],
+    least: NoiseFigures,
     motion: Motion,
 ) -> NoiseFigures:
     """Figures that maximise the likelihood of what was decided to belong to the track."""
@@ -198,8 +203,8 @@ def _likeliest(
     def figures(theta: FloatArray) -> NoiseFigures:
         factor: FloatArray = np.exp(np.clip(theta, -_WIDEST, _WIDEST))
         p, v = first.position.copy(), first.velocity.copy()
-        p[free_position] = np.maximum(p[free_position] * factor[:i], floor[0])
-        v[free_velocity] = np.maximum(v[free_velocity] * factor[i:j], floor[1])
+        p[free_position] = np.maximum(p[free_position] * factor[:i], least.position[free_position])
+        v[free_velocity] = np.maximum(v[free_velocity] * factor[i:j], least.velocity[free_velocity])
         return NoiseFigures(p, v, float(first.process * factor[j]) if size > j else first.process)
 
     def cost(theta: FloatArray) -> float:

@@ -8,15 +8,13 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
-from surefix.filters.hypotheses import Prior
-from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis
 from surefix.geo.angle import wrap
 from surefix.models.motion import MODELS
 from surefix.pipelines.judge import FilterState, begin, blank_status, estimate, verdicts
-from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
+from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.present import UNKNOWN
 from surefix.pipelines.setup import FARTHEST
 from surefix.types import (
@@ -34,7 +32,6 @@ CHANNEL_HEAD = 2000
 """Values that a series is settled on in real time; the other modes see it whole."""
 
 _RECOVERY_VALUES = 30
-_RUN_VALUES = 39.5  # longest run of wrong values that several hypotheses survive
 _LAG_VALUES = 20
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
@@ -48,7 +45,6 @@ class ChannelState(NamedTuple):
     repeats: RepeatState | None = None
     motion: Motion | None = None
     recovery: Recovery = Recovery(np.inf, 1.0)
-    prior: Prior | None = None
     lag: float = 0.0
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
@@ -122,15 +118,13 @@ def clean_channel(
         options,
         state.motion,
         state.recovery,
-        state.prior,
+        None,
         state.lag,
         epochs,
         np.ones(n, np.bool_),
         state.filter,
     )
-    judged = verdicts(
-        estimated, epochs, state.motion, status, (0,), several=state.prior is not None
-    )
+    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=False)
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
     known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
@@ -173,24 +167,10 @@ def _settle(
     steps = steps[steps > 0.0]
     interval = float(np.median(steps)) if len(steps) else 1.0
     turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
-    several = options.method == MULTI_HYPOTHESIS
-    values_lost = _RUN_VALUES if several else _RECOVERY_VALUES
     recovery = Recovery(
-        float(options.recovery_s or values_lost * interval),
+        float(options.recovery_s or _RECOVERY_VALUES * interval),
         max(speed_scale(tau[seen], turned), 1e-6),
     )
-    prior = None
-    if several:
-        figures, prior = learn(
-            observations,
-            unknown,
-            figures,
-            order=order,
-            period=new.period,
-            speed=recovery.sigma_velocity,
-            longest=recovery.after,
-            floor=(max(quantum / 12.0**0.5, 1e-9), 1e-9),
-        )
     motion = Motion(order, 1, np.array([figures.process**2]), by_axis(1), 2, new.period)
     unit = new.name.rsplit("_", 1)[-1]
     sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
@@ -207,9 +187,8 @@ def _settle(
     return state._replace(
         motion=motion,
         recovery=recovery,
-        prior=prior,
         lag=float(options.lag_s or _LAG_VALUES * interval),
         sigma=sigma,
         noise=noise,
-        filter=begin(options, motion, recovery, prior),
+        filter=begin(options, motion, recovery, None),
     )
