@@ -1,6 +1,7 @@
 """Draw the pictures of docs/papers: each figure of each paper's experiment as one SVG file.
 
-Run ``python docs/papers.py [PAPER …]``. All data are simulated from seed 1, one run.
+Run ``python docs/papers.py [PAPER …]``. All data are simulated from seed 1, one run. With the name
+``compare`` it draws those of docs/compare.md: every scenario, which takes some minutes.
 """
 
 from __future__ import annotations
@@ -10,18 +11,22 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from surefix.experiment import Figure, Panel, Trace
+from surefix.comparison.options import CompareOptions
+from surefix.comparison.run import compare
+from surefix.experiment import Experiment, Figure, Panel, Trace
 from surefix.papers.reproduce import PAPERS, reproduce
-from surefix.report.experiment import colours_of
+from surefix.report.experiment import colours_of, widths_of
 
 __all__ = ["draw", "write"]
 
 PLACE = Path(__file__).parent / "papers"
 INK, GREY, MUTED = "#1c2733", "#b4bec7", "#5c6a78"
 PANEL = (5.2, 2.6)  # inches
+NARROW = 3.6  # inches, width of a panel where three or more stand side by side
 STYLE = {
     "svg.hashsalt": "surefix",
     "svg.fonttype": "none",
@@ -44,35 +49,54 @@ def draw(figure: Figure) -> Canvas:
     """Draw one figure: panels in a grid and one legend below them."""
     columns = min(figure.columns, len(figure.panels))
     rows = -(-len(figure.panels) // columns)
-    canvas = Canvas(figsize=(PANEL[0] * columns, PANEL[1] * rows + 0.5), layout="constrained")
+    width = (PANEL[0] if columns < 3 else NARROW) * columns
+    canvas = Canvas(figsize=(width, PANEL[1] * rows), layout="constrained")
     grid = np.ravel(canvas.subplots(rows, columns, squeeze=False))
     named = colours_of(figure)
     entries = {}
     for axes, panel in zip(grid, figure.panels, strict=False):
-        for trace in panel.traces:
-            entries.setdefault(trace.name, _line(axes, trace, named))
+        widths = widths_of(panel)
+        for trace, lw in zip(panel.traces, widths, strict=True):
+            entries.setdefault(trace.name, _line(axes, trace, named, lw))
         _dress(axes, panel)
     for axes in grid[len(figure.panels) :]:
         axes.set_visible(False)
-    canvas.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside lower center",
-        ncols=min(len(entries), 3 * columns + 1),
-        frameon=False,
-    )
+    _legend(canvas, entries)
     return canvas
 
 
+def _legend(canvas: Canvas, entries: dict[str, Artist]) -> None:
+    """One legend below the panels, in as few rows as the width allows."""
+    for columns in range(len(entries), 0, -1):
+        legend = canvas.legend(
+            entries.values(),
+            entries.keys(),
+            loc="outside lower center",
+            ncols=columns,
+            frameon=False,
+        )
+        if legend.get_window_extent().width < 0.96 * canvas.bbox.width or columns == 1:
+            canvas.set_figheight(canvas.get_figheight() + 0.3 + 0.18 * -(-len(entries) // columns))
+            return
+        legend.remove()
+
+
 def write(paper: str) -> list[Path]:
-    """Write the pictures of one paper and give their places."""
+    """Write the pictures of one paper, or of the comparison, and give their places."""
     written = []
-    PLACE.mkdir(exist_ok=True)
+    place = PLACE.parent if paper == "compare" else PLACE
+    place.mkdir(exist_ok=True)
     with mpl.rc_context(STYLE):
-        for figure in reproduce(paper, seed=1, runs=1).figures:
-            written.append(PLACE / f"{paper}-{figure.key}.svg")
+        for figure in _experiment(paper).figures:
+            written.append(place / f"{paper}-{figure.key}.svg")
             draw(figure).savefig(written[-1], metadata={"Date": None, "Creator": None})
     return written
+
+
+def _experiment(paper: str) -> Experiment:
+    if paper == "compare":
+        return compare(CompareOptions(runs=1, modes=("offline", "realtime"), jobs=2))
+    return reproduce(paper, seed=1, runs=1)
 
 
 def _dress(axes: Axes, panel: Panel) -> None:
@@ -88,7 +112,7 @@ def _dress(axes: Axes, panel: Panel) -> None:
         axes.set_aspect("equal", adjustable="datalim")
 
 
-def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]]) -> object:
+def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]], lw: float) -> Artist:
     """Draw one trace; gives its entry of the legend."""
     style: dict[str, object]
     match trace.kind:
@@ -101,8 +125,8 @@ def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]]) -> object
         case _:
             colour, dash = named[trace.name]
             ls = {"solid": "-", "dash": "--", "dot": ":"}[dash]
-            style = {"color": colour, "lw": 1.3, "ls": ls}
-            style |= {"marker": "o", "ms": 3.5} if trace.kind == "points" else {}
+            style = {"color": colour, "lw": lw, "ls": ls}
+            style |= {"marker": "o", "ms": 2.2 + lw} if trace.kind == "points" else {}
     return axes.plot(trace.x, trace.y, **style)[0]
 
 

@@ -199,3 +199,11 @@ def test_nothing_observed_changes_nothing():
     assert np.array_equal(after.factor, x.factor)
     assert np.isnan(info.weight).all()
     assert np.isnan(info.nis).all()
+
+
+def test_covariances_of_a_stack():
+    rng = np.random.default_rng(1)
+    factor = rng.standard_normal((4, 2, 3, 3))
+    stack = Gaussian(np.zeros((4, 2, 3)), factor).covariance
+    for i in np.ndindex(4, 2):
+        np.testing.assert_allclose(stack[i], factor[i] @ factor[i].T, rtol=1e-12, atol=1e-12)

@@ -33,15 +33,15 @@ Spread = Literal["innovation", "noise"]
 
 
 class Gaussian(NamedTuple):
-    """A state estimate: ``mean`` (n,) and ``factor`` S, (n, n), of its covariance ``S Sᵀ``."""
+    """A state estimate: ``mean`` (…, n) and ``factor`` S, (…, n, n), of its covariance ``S Sᵀ``."""
 
     mean: FloatArray
     factor: FloatArray
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance P = S Sᵀ, (n, n)."""
-        return self.factor @ self.factor.T
+        """Covariance P = S Sᵀ, (…, n, n)."""
+        return self.factor @ np.swapaxes(self.factor, -1, -2)
 
 
 class Innovation(NamedTuple):

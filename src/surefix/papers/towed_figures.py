@@ -54,7 +54,7 @@ def figures(
         ),
         Figure(
             key="contamination",
-            title="How much is lost to an oracle that knows the bad values; position at the surface",
+            title="RMSE ÷ that of an oracle that knows the bad values; position at the surface",
             panels=tuple(map(_shares, contamination, ("position", "heading"))),
             columns=2,
         ),

@@ -190,23 +190,26 @@ def tables(runs: Sequence[Figures]) -> tuple[Table, ...]:
         ),
         make(
             "readings_rmse_m", "RMSE by reading, mean of the axes", FIRST, printed=mean_m,
+            of="Reading",
             note="Each row changes the first in what it names; the last has k0, k1 = 1.5, 4.5 too.",
         ),
         make(
             "readings_rejected_pct", "Gross errors rejected by reading, mean of the axes", FIRST,
-            "%", printed=mean_pct, digits=1,
+            "%", printed=mean_pct, digits=1, of="Reading",
         ),
         make(
             "huber_rejected_pct", "Gross errors rejected by Huber, mean of the axes",
-            [f"k0 = {k0:g}" for k0 in _STARTS], "%", digits=1,
+            [f"k0 = {k0:g}" for k0 in _STARTS], "%", digits=1, of="Process noise",
             note="The paper: 36.4, 38.8 and 43.8 % in X, Y and Z.",
         ),
         make(
             "constants_rmse_m", "RMSE by constants of the weights, mean of the axes", both,
+            of="Constants",
             note="Gross errors from 2 m on: larger ones are rejected with any of these constants.",
         ),
         make(
             "least_size_m", "RMSE by least size of the gross errors, mean of the axes", least,
+            of="Gross errors",
             note="IGG rejects from k1 = 3 m on; what is smaller is used in part.",
         ),
         make(

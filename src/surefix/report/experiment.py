@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +16,7 @@ from surefix.report.shell import Section, page, place
 from surefix.report.style import CLEAN, FRAME, INK, MUTED, Figure, axis, layout
 from surefix.report.wording import escape, number, table
 
-__all__ = ["COLOURS", "colours_of", "write_experiment"]
+__all__ = ["COLOURS", "colours_of", "widths_of", "write_experiment"]
 
 COLOURS: Final = (
     CLEAN, "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5c3e", "#8a63d2",
@@ -70,19 +71,37 @@ def colours_of(picture: Picture) -> dict[str, tuple[str, str]]:
     }
 
 
+def widths_of(panel: Panel) -> list[float]:
+    """Width of each trace's line, px: where marked lines may lie on each other, later ones thinner.
+
+    Returns
+    -------
+    widths
+        One per trace; 1.4 for a plain line, 3.2 down to 1.2 for lines with marks.
+    """
+    marked = sum(trace.kind == "points" for trace in panel.traces)
+    steps = iter(np.linspace(3.2, 1.2, marked).tolist() if marked > 2 else [1.6] * marked)
+    return [next(steps) if trace.kind == "points" else 1.4 for trace in panel.traces]
+
+
 def _sections(experiment: Experiment) -> list[Section]:
     found = "".join(f"<li>{escape(finding)}</li>" for finding in experiment.findings)
     parts = [Section("findings", "Findings", "Findings", f"<ul>{found}</ul>")] if found else []
     parts += [
-        Section(f"table-{t.key}", _heading(t), escape(t.title), _table(t))
+        Section(f"table-{t.key}", _heading(t), _short(t.title), _table(t))
         for t in experiment.tables
     ]
     for picture in experiment.figures:
         drawn = _drawn(picture)
         title = escape(picture.title)
         name = f"section-{picture.key}"
-        parts.append(Section(name, title, escape(picture.key), place(drawn), (drawn,)))
+        parts.append(Section(name, title, _short(picture.title), place(drawn), (drawn,)))
     return parts
+
+
+def _short(title: str) -> str:
+    """Title for the row of links: up to its first aside."""
+    return escape(re.split(r"[(:;,] ?", title, maxsplit=1)[0].strip())
 
 
 def _heading(shown: Table) -> str:
@@ -96,15 +115,20 @@ def _table(shown: Table) -> str:
         rows.append([escape(row), *cells])
         if row in shown.printed:
             printed = [number(v, shown.digits) for v in shown.printed[row]]
-            rows.append(["<small>printed in the paper</small>", *printed])
+            rows.append([_aside("printed in the paper"), *map(_aside, printed)])
     note = f'<p class="note">{escape(shown.note)}</p>' if shown.note else ""
     names = [escape(shown.of), *(f"{escape(column)}#" for column in shown.columns)]
     return table(names, rows, kind="experiment") + note
 
 
 def _cell(mean: float, spread: float, digits: int) -> str:
-    aside = f" <small>± {number(spread, digits)}</small>" if np.isfinite(spread) else ""
-    return number(mean, digits) + aside
+    return number(mean, digits) + (
+        " " + _aside(f"± {number(spread, digits)}") if np.isfinite(spread) else ""
+    )
+
+
+def _aside(text: str) -> str:
+    return f"<small>{text}</small>"
 
 
 def _drawn(picture: Picture) -> Figure:
@@ -125,7 +149,8 @@ def _drawn(picture: Picture) -> Figure:
         axes[f"yaxis{name}"] = _y_axis(panel, [low_y, high_y], name)
         titles.append(_title(panel.title, low_x, high_y))
         where = {"xaxis": f"x{name}", "yaxis": f"y{name}"}
-        data += [_line(trace, named) | where for trace in panel.traces]
+        pairs = zip(panel.traces, widths_of(panel), strict=True)
+        data += [_line(trace, named, width) | where for trace, width in pairs]
     return {
         "id": picture.key,
         "label": picture.title,
@@ -176,7 +201,7 @@ def _title(text: str, x: float, y: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _line(trace: Trace, named: dict[str, tuple[str, str]]) -> dict[str, Any]:
+def _line(trace: Trace, named: dict[str, tuple[str, str]], width: float) -> dict[str, Any]:
     shape: dict[str, Any] = {"type": "scatter", "name": trace.name, "x": trace.x, "y": trace.y}
     match trace.kind:
         case "truth":
@@ -189,11 +214,11 @@ def _line(trace: Trace, named: dict[str, tuple[str, str]]) -> dict[str, Any]:
             marker = {"symbol": "x-thin", "size": 6, "color": MUTED, "line": line}
             return shape | {"mode": "markers", "marker": marker}
     colour, dash = named[trace.name]
-    line = {"color": colour, "width": 1.6} | ({"dash": dash} if dash != "solid" else {})
+    line = {"color": colour, "width": width} | ({"dash": dash} if dash != "solid" else {})
     if trace.kind == "points":
         return shape | {
             "mode": "lines+markers",
             "line": line,
-            "marker": {"symbol": "circle", "size": 6, "color": colour},
+            "marker": {"symbol": "circle", "size": 4.0 + width, "color": colour},
         }
     return shape | {"mode": "lines", "line": line, "connectgaps": False}
