@@ -35,17 +35,17 @@ from surefix.cleaning.tukey53h import DELAY, tukey53h
 from surefix.filters.median_recursion import filter_medians, median_recursion, start_medians
 from surefix.filters.median_step import MedianRecursion, MedianState
 from surefix.filters.records import Epochs, Motion, Recovery, TrackState
-from surefix.types import BoolArray, FloatArray, Verdict
+from surefix.types import BoolArray, FloatArray, IntArray, Verdict
 
 __all__ = ["AHEAD", "THRESHOLDS", "Decided", "Decider", "Recursion", "decide", "look_ahead"]
 
 _HAMPEL = 7  # samples in the window
 _WINDOW = 15  # samples in the windows of the recursion, and steps whose median is the usual one
 _GAIN = 0.5
-_LONGEST = 30  # rejected samples on end after which the recursion believes them
+_LONGEST = 20  # rejected samples on end after which the recursion believes them
 _MISSED = _WINDOW // 2  # usual steps without a sample that it bridges
 
-THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 5.0}
+THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 4.5}
 """Names of the cleaners, and k₀ of each unless it is given."""
 AHEAD = {"53h": DELAY, "hampel": 2 * (_HAMPEL // 2), "median": 0}
 """How many later samples each of them looks at."""
@@ -96,7 +96,7 @@ class _Series(NamedTuple):
     """The known samples of one component from one sensor: (n,) each."""
 
     key: tuple[int, int]
-    rows: np.ndarray[tuple[int], np.dtype[np.int64]]
+    rows: IntArray
     time: FloatArray
     x: FloatArray
     sigma: FloatArray
@@ -109,7 +109,7 @@ def decide(
     recovery: Recovery,
     epochs: Epochs,
     series: dict[tuple[int, int], Recursion],
-) -> tuple[dict[tuple[int, int], Recursion], Epochs]:
+) -> tuple[dict[tuple[int, int], Recursion], Epochs, FloatArray]:
     """Fix the weight 0 of every observation that the cleaner would replace.
 
     Parameters
@@ -128,17 +128,26 @@ def decide(
     -------
     series, epochs
         For the next call, and the epochs with weights.
+    distance
+        (n, groups) what was decided on: how far the observation lay from what the cleaner held it
+        against, in standard deviations; NaN where there was no observation.
     """
     fixed, after = epochs.fixed.copy(), dict(series)
+    distance = np.full_like(fixed, np.nan)
     for each in _all(motion, epochs):
-        if decider.method == "median":
-            after[each.key], wild = _by_medians(decider, each, series.get(each.key))
+        if decider.method == "53h":
+            far = _by_53h(each, recovery.sigma_velocity)
+            wild = far > decider.k0
+        elif decider.method == "hampel":
+            far = _by_hampel(each)
+            wild = far > decider.k0
         else:
-            wild = _by_window(decider, each, recovery.sigma_velocity)
+            after[each.key], far, wild = _by_medians(decider.k0, each, series.get(each.key))
         group = motion.group[each.key[1]]
+        distance[each.rows, group] = far
         rows = each.rows[wild]
         fixed[rows, group] = np.where(np.isnan(fixed[rows, group]), 0.0, fixed[rows, group])
-    return after, epochs._replace(fixed=fixed)
+    return after, epochs._replace(fixed=fixed), distance
 
 
 def look_ahead(decider: Decider, motion: Motion, epochs: Epochs) -> float:
@@ -164,42 +173,39 @@ def _all(motion: Motion, epochs: Epochs) -> list[_Series]:
     return out
 
 
-def _by_window(decider: Decider, series: _Series, speed: float) -> BoolArray:
-    """What 53H or Hampel's identifier would replace."""
-    x, period = series.x, series.period
-    hampels = decider.method == "hampel"
-    if hampels:
-        found = hampel(x, window=_HAMPEL, n_sigma=decider.k0, period=period)
-    else:
-        found = tukey53h(x, np.inf, period=period)
-    off = x - found.estimate
-    if period > 0.0:
-        off -= period * np.rint(off / period)
-    if hampels:
-        scale = rolling_scale(off, _HAMPEL, centred=True)
-    else:
-        scale = np.full(len(x), MAD_TO_SIGMA * np.median(np.abs(off)))
-    limit = np.fmax(scale, series.sigma)
-    if not hampels:
-        steps = np.diff(series.time)
-        longer = np.fmax(np.append(steps, 0.0), np.append(0.0, steps))
-        limit = np.hypot(limit, 0.25 * speed * np.fmax(longer - _usual(steps), 0.0))
-    return np.asarray(np.abs(off) > decider.k0 * limit)
+def _by_53h(series: _Series, speed: float) -> FloatArray:
+    """Distance from x₃ in standard deviations."""
+    off = _off(series, tukey53h(series.x, np.inf, period=series.period).estimate)
+    scale = MAD_TO_SIGMA * np.median(np.abs(off))
+    steps = np.diff(series.time)
+    longer = np.fmax(np.append(steps, 0.0), np.append(0.0, steps))
+    usual = np.median(steps) if len(steps) else 0.0
+    across = 0.25 * speed * np.fmax(longer - usual, 0.0)
+    return np.asarray(np.abs(off) / np.hypot(np.fmax(scale, series.sigma), across))
 
 
-def _usual(steps: FloatArray) -> float:
-    return float(np.median(steps)) if len(steps) else 0.0
+def _by_hampel(series: _Series) -> FloatArray:
+    """Distance from the running median in standard deviations."""
+    off = _off(series, hampel(series.x, window=_HAMPEL, period=series.period).estimate)
+    scale = rolling_scale(off, _HAMPEL, centred=True)
+    return np.asarray(np.abs(off) / np.fmax(scale, series.sigma))
+
+
+def _off(series: _Series, estimate: FloatArray) -> FloatArray:
+    """How far the samples lie from their estimates; angles within half a turn."""
+    off = series.x - estimate
+    return off - series.period * np.rint(off / series.period) if series.period > 0.0 else off
 
 
 def _by_medians(
-    decider: Decider, series: _Series, before: Recursion | None
-) -> tuple[Recursion, BoolArray]:
-    """What the median recursion rejects; every sample is judged by those before it alone."""
+    k0: float, series: _Series, before: Recursion | None
+) -> tuple[Recursion, FloatArray, BoolArray]:
+    """Distance from the median recursion's prediction, and what it rejects."""
     if before is None:
         settings = median_recursion(
             window=_WINDOW,
             gain=_GAIN,
-            gate=decider.k0,
+            gate=k0,
             longest_burst=_LONGEST,
             floor=float(series.sigma[0]),
             period=series.period,
@@ -208,7 +214,7 @@ def _by_medians(
     settings, state = before.settings, before.state
     steps = np.concatenate([before.steps, np.diff(series.time, prepend=before.time)])
     missed = _missed(steps)
-    wild = np.zeros(len(series.x), np.bool_)
+    wild, far = np.zeros(len(series.x), np.bool_), np.empty(len(series.x))
     anew = np.flatnonzero(missed > _MISSED).tolist()
     for first, last in pairwise([0, *anew, len(wild)]):
         if first == last:
@@ -221,12 +227,14 @@ def _by_medians(
         filled[at] = series.x[first:last]
         filling = state.tally[0] + at < _WINDOW
         (state,), found = filter_medians(settings, filled, (state,))
-        beyond = np.abs(found.residual[at]) > settings.gate * found.scale[at]
-        wild[first:last] = np.where(filling, beyond, found.verdict[at] == Verdict.REJECTED)
-    return Recursion(settings, state, float(series.time[-1]), steps[-_WINDOW:]), wild
+        part = slice(first, last)
+        far[part] = np.abs(found.residual[at]) / found.scale[at]
+        rejected = found.verdict[at] == Verdict.REJECTED
+        wild[part] = np.where(filling, far[part] > settings.gate, rejected)
+    return Recursion(settings, state, float(series.time[-1]), steps[-_WINDOW:]), far, wild
 
 
-def _missed(steps: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _missed(steps: FloatArray) -> IntArray:
     """How many usual steps without a sample lie before each, after the first 15 of ``steps``."""
     usual = running_median(steps, _WINDOW, centred=False)[_WINDOW - 1 : -1]
     step = steps[_WINDOW:]

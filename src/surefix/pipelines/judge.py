@@ -104,11 +104,11 @@ def estimate(
         return realtime_hypotheses(motion, prior, epochs, state)
     if isinstance(state, Decided):
         assert options.decider is not None
-        series, epochs = decide(options.decider, motion, recovery, epochs, state.series)
+        series, epochs, far = decide(options.decider, motion, recovery, epochs, state.series)
         lag = max(lag - look_ahead(options.decider, motion, epochs), 0.0)
         track, found = estimate(options, motion, recovery, prior, lag, epochs, wanted, state.track)
         assert isinstance(track, TrackState)
-        return Decided(track, series), found
+        return Decided(track, series), found._replace(distance=far)
     assert isinstance(state, TrackState)
     if options.mode == "realtime":
         return realtime(motion, options.loss, recovery, epochs, state)
