@@ -15,10 +15,12 @@ smoother, so that the track and its covariance come from what was really measure
     for the whole window, grows with the speed of the vehicle. Looks 6 samples ahead.
 ``median``
     The median recursion with feedback (paper 004; `surefix.filters.median_recursion`): the past
-    alone decides. While its window fills, a sample is held against the repeated-median line.
+    alone decides, |r| > k₀ max(s, σ). Windows of 9 samples and a gain of ½, for a vehicle that
+    turns; more than 20 rejected samples on end are believed. While the windows fill, a sample is
+    held against the repeated-median line.
 
 The first two see the order of the samples and not their times. The recursion supposes equal steps:
-a longer step counts as so many usual ones (the median of the last 15), and after more than seven of
+a longer step counts as so many usual ones (the median of the last 9), and after more than four of
 them without a sample the recursion begins anew.
 """
 
@@ -40,12 +42,12 @@ from surefix.types import BoolArray, FloatArray, IntArray, Verdict
 __all__ = ["AHEAD", "THRESHOLDS", "Decided", "Decider", "Recursion", "decide", "look_ahead"]
 
 _HAMPEL = 7  # samples in the window
-_WINDOW = 15  # samples in the windows of the recursion, and steps whose median is the usual one
+_WINDOW = 9  # samples in the windows of the recursion, and steps whose median is the usual one
 _GAIN = 0.5
 _LONGEST = 20  # rejected samples on end after which the recursion believes them
 _MISSED = _WINDOW // 2  # usual steps without a sample that it bridges
 
-THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 4.5}
+THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 5.0}
 """Names of the cleaners, and k₀ of each unless it is given."""
 AHEAD = {"53h": DELAY, "hampel": 2 * (_HAMPEL // 2), "median": 0}
 """How many later samples each of them looks at."""
@@ -68,7 +70,7 @@ class Recursion(NamedTuple):
     time
         s, of the last sample.
     steps
-        (15,) s, the last steps; NaN before the first.
+        (9,) s, the last steps; NaN before the first.
     """
 
     settings: MedianRecursion
@@ -235,7 +237,7 @@ def _by_medians(
 
 
 def _missed(steps: FloatArray) -> IntArray:
-    """How many usual steps without a sample lie before each, after the first 15 of ``steps``."""
+    """How many usual steps without a sample lie before each, after the first 9 of ``steps``."""
     usual = running_median(steps, _WINDOW, centred=False)[_WINDOW - 1 : -1]
     step = steps[_WINDOW:]
     known = usual > 0.0
