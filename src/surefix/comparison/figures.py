@@ -94,7 +94,7 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
                 x_label="time, s" if mode == options.modes[-1] else "",
                 y_label="error, m",
                 traces=(
-                    Trace("gross error of the fix", time[bad], wrong[bad], "bad"),
+                    Trace("bad fix", time[bad], wrong[bad], "bad"),
                     *(
                         Trace(name, time, error[rows], "truth" if name == ORACLE else "line")
                         for name, error in lines.items()

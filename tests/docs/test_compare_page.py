@@ -1,0 +1,42 @@
+"""The page on comparisons holds the scenarios and the figures of the code."""
+
+import re
+import shlex
+
+import pytest
+
+from docs.pages import ROOT, blocks
+from surefix.comparison.options import CompareOptions
+from surefix.comparison.run import compare
+from surefix.simulate.contamination import SCENARIOS
+
+PAGE = ROOT / "docs" / "compare.md"
+
+
+def test_scenarios_are_all_there():
+    below = PAGE.read_text(encoding="utf-8").split("## The scenarios")[1].split("\n## ")[0]
+    rows = [line.split("|")[1] for line in below.splitlines() if line.startswith("| `")]
+    assert [name for row in rows for name in re.findall(r"`([^`]+)`", row)] == list(SCENARIOS)
+
+
+def test_recorded_figures_are_those_of_the_code():
+    scenario = "burst-common"  # its figures differ most from run to run
+    (recorded,) = (block.text for block in blocks(PAGE) if block.info == "recorded")
+    command, _, printed = recorded.partition("\n")
+    words = shlex.split(command.removeprefix("$ "))
+    given = {words[i][2:]: words[i + 1] for i in range(2, len(words), 2)}
+    made = compare(
+        CompareOptions(
+            methods=("igg3",),
+            scenarios=(scenario,),
+            modes=("offline", "realtime"),
+            runs=int(given["runs"]),
+        )
+    )
+    column = given["methods"].split(",").index("igg3")
+    tables = {part.splitlines()[0]: part for part in printed.split("\n\n")}
+    for table in made.tables:
+        if table.key.startswith("rmse_ratio"):
+            (row,) = re.findall(rf"^  {scenario} .*$", tables[table.title], re.MULTILINE)
+            shown = re.findall(r"([\d.]+) ± [\d.]+", row)[column]
+            assert float(shown) == pytest.approx(float(table.mean[0, 0]), rel=0.1)
