@@ -146,6 +146,7 @@ def apply_position(
 @helper
 def merge(motion: Motion, bank: Bank, count: int, keep: BoolArray) -> None:
     """Let the lesser of two hypotheses that say the same add its weight to the greater."""
+    b = motion.order
     for i in range(count):
         keep[i] = True
     for i in range(count):
@@ -162,6 +163,10 @@ def merge(motion: Motion, bank: Bank, count: int, keep: BoolArray) -> None:
                 if bank.seen[i, a] != bank.seen[j, a]:
                     alike = False
                     break
+                if bank.run[i] >= 0:
+                    gap = bank.mean[i, a, b] - bank.mean[j, a, b]
+                    P = bank.covariance[i, a, b, b]
+                    distance += gap * gap / P if P > 0.0 else 0.0
                 for s in range(2):
                     gap = bank.mean[i, a, s] - bank.mean[j, a, s]
                     P = bank.covariance[i, a, s, s]
