@@ -19,7 +19,7 @@ from surefix.comparison.options import CompareOptions
 from surefix.comparison.run import compare
 from surefix.experiment import Experiment, Figure, Panel, Trace
 from surefix.papers.reproduce import PAPERS, reproduce
-from surefix.report.experiment import colours_of, widths_of
+from surefix.report.experiment import colours_of
 
 __all__ = ["draw", "write"]
 
@@ -55,9 +55,8 @@ def draw(figure: Figure) -> Canvas:
     named = colours_of(figure)
     entries = {}
     for axes, panel in zip(grid, figure.panels, strict=False):
-        widths = widths_of(panel)
-        for trace, lw in zip(panel.traces, widths, strict=True):
-            entries.setdefault(trace.name, _line(axes, trace, named, lw))
+        for trace in panel.traces:
+            entries.setdefault(trace.name, _line(axes, trace, named))
         _dress(axes, panel)
     for axes in grid[len(figure.panels) :]:
         axes.set_visible(False)
@@ -112,7 +111,7 @@ def _dress(axes: Axes, panel: Panel) -> None:
         axes.set_aspect("equal", adjustable="datalim")
 
 
-def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]], lw: float) -> Artist:
+def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]]) -> Artist:
     """Draw one trace; gives its entry of the legend."""
     style: dict[str, object]
     match trace.kind:
@@ -125,8 +124,8 @@ def _line(axes: Axes, trace: Trace, named: dict[str, tuple[str, str]], lw: float
         case _:
             colour, dash = named[trace.name]
             ls = {"solid": "-", "dash": "--", "dot": ":"}[dash]
-            style = {"color": colour, "lw": lw, "ls": ls}
-            style |= {"marker": "o", "ms": 2.2 + lw} if trace.kind == "points" else {}
+            style = {"color": colour, "lw": 1.3, "ls": ls}
+            style |= {"marker": "o", "ms": 3.5} if trace.kind == "points" else {}
     return axes.plot(trace.x, trace.y, **style)[0]
 
 

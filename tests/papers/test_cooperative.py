@@ -55,6 +55,13 @@ def test_ratio_to_the_centralised_filter(mean):
     assert (best < mean("ratio", "gain weights")[NOISE] + 0.01).all()
 
 
+def test_how_the_noise_is_scaled_decides_what_gain_weights_lose(mean):
+    by_gain = mean("axes_scaled", "gain weights")
+    assert by_gain[0] == pytest.approx(mean("axes", "gain weights")[-1])
+    assert by_gain[0] > by_gain[1] > by_gain[2] > 1.3
+    assert mean("axes_scaled", "Bar-Shalom–Campo") == pytest.approx(np.ones(3), abs=0.05)
+
+
 def test_covariances_are_honest_where_the_model_is_right(mean):
     for row in ("gain weights", "mean of estimates", "Bar-Shalom–Campo", "centralised filter"):
         assert mean("nees", row)[NOISE] == pytest.approx(np.ones(3), abs=0.17)

@@ -8,7 +8,7 @@ import pytest
 
 from surefix.errors import OutputError
 from surefix.experiment import Experiment, Figure, Panel, Trace, gather
-from surefix.report.experiment import COLOURS, colours_of, widths_of, write_experiment
+from surefix.report.experiment import COLOURS, colours_of, write_experiment
 
 
 def made(**changes):
@@ -62,10 +62,9 @@ def test_links_name_each_section_without_its_aside(page):
         assert f'id="{target}"' in page
 
 
-def test_lines_that_lie_on_each_other_become_thinner():
-    panel, named = made().figures[0].panels
-    assert widths_of(panel) == [1.4, 3.2, 2.2, 1.2]
-    assert widths_of(named) == [1.4, 1.4, 1.4]
+def test_marked_lines_that_lie_on_each_other_can_be_told_apart():
+    dashes = {name: dash for name, (_, dash) in colours_of(made().figures[0]).items()}
+    assert dashes == {"KF": "solid", "Huber": "dash", "IGG3": "solid"}
 
 
 def test_one_name_has_one_colour_in_all_panels():

@@ -15,7 +15,7 @@ from surefix.experiment import Experiment, Progress, Table, gather
 from surefix.papers.cooperative_figures import figures
 from surefix.papers.cooperative_findings import PRINTED_GAINS, PRINTED_WEIGHTS, findings
 from surefix.papers.cooperative_options import CooperativeOptions
-from surefix.papers.cooperative_rows import AXES, EPOCHS, GROSS, Rows, Shown, rows_of
+from surefix.papers.cooperative_rows import AXES, EPOCHS, GROSS, SCALES, Rows, Shown, rows_of
 
 __all__ = ["CooperativeOptions", "run"]
 
@@ -117,11 +117,20 @@ def _tables(options: CooperativeOptions, rows: dict[str, Rows]) -> tuple[Table, 
             "Case 1, noise.",
         ),
         _table(
+            "axes_scaled",
+            "The same at 1:8, by how the noise is scaled",
+            tuple(SCALES),
+            rows,
+            digits=2,
+            note="What the gain weights lose depends on how large the noise is beside Q.",
+        ),
+        _table(
             "readings",
             "What R may mean: case 1 under three readings",
             ("gain 1", "gain 2", "gain 3", "masters, m", "gain weights, m", "centralised, m"),
             rows,
             digits=3,
+            of="Reading",
             printed={"position": (*PRINTED_GAINS, *[math.nan] * 3)},
             note="Gains at iteration 70; RMSE of single masters, of their fusion, of one filter.",
         ),
@@ -168,6 +177,7 @@ def _table(
     printed: dict[str, tuple[float, ...]] | None = None,
     digits: int = 3,
     note: str = "",
+    of: str = "Method",
 ) -> Table:
     count = len(next(iter(rows[key].values())))
     return gather(
@@ -179,4 +189,5 @@ def _table(
         printed=printed,
         digits=digits,
         note=note,
+        of=of,
     )

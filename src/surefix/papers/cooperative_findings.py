@@ -101,11 +101,13 @@ def _elsewhere(tables: Mapping[str, Table]) -> tuple[str, ...]:
         return float(tables[key].mean[tables[key].rows.index(row), column])
 
     ratio = tables["axes"].columns[-1]
+    scaled = tables["axes_scaled"].mean[tables["axes_scaled"].rows.index(GAIN)]
     share = tables["gross_m"].columns[-1]
     return (
         f"Masters that are good along one axis each ({ratio}): gain weights "
         f"{at('axes', GAIN, -1):.2f} times the centralised filter, {_CI} "
-        f"{at('axes', _CI, -1):.2f}, {_BSC} {at('axes', _BSC, -1):.2f}.",
+        f"{at('axes', _CI, -1):.2f}, {_BSC} {at('axes', _BSC, -1):.2f}. By how the noise is scaled "
+        f"to 1:8, the gain weights lie between {scaled.min():.2f} and {scaled.max():.2f}.",
         f"With {share} gross errors the gain-weighted fusion errs by "
         f"{at('gross_m', GAIN, -1):.1f} m, with threshold weighting "
         f"{at('gross_m', f'{GAIN}, thresholds', -1):.1f} m (without any gross error "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from surefix.papers.cooperative_tracks import (
 from surefix.simulate.cooperative import READINGS, Formation, simulate, stack
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["AXES", "BEST", "BOUND", "EPOCHS", "GROSS", "Rows", "Shown", "rows_of"]
+__all__ = ["AXES", "BEST", "BOUND", "EPOCHS", "GROSS", "SCALES", "Rows", "Shown", "rows_of"]
 
 Rows = dict[str, FloatArray]
 """Row → (runs, columns)."""
@@ -35,6 +35,12 @@ EPOCHS = {1: (10, 30, 50, 70, 90), 2: (15, 35, 55, 75, 95)}
 """Iterations of Tables 3 and 5: the paper's are lost but for 70 and 75."""
 AXES = (1.0, 2.0, 4.0, 8.0)
 """How many times noisier a master's poor axes are than its good one."""
+SCALES = {
+    "good ÷ 8": (1.0 / 8.0, 1.0),
+    "geometric": (8.0 ** (-2.0 / 3.0), 8.0 ** (1.0 / 3.0)),
+    "poor × 8": (1.0, 8.0),
+}
+"""Three ways to 1:8: factors of σ of a master's good axis and of its two poor ones."""
 GROSS = (0.0, 0.05, 0.1, 0.2)
 """Shares of gross errors."""
 
@@ -64,7 +70,8 @@ def rows_of(options: CooperativeOptions, seeds: list[list[int]]) -> tuple[dict[s
             row: _fit(error, np.array(EPOCHS[case]) - 1) for row, error in errors.items()
         }
     rows |= _comparison(sailed)
-    rows["axes"] = _axes(options, seeds)
+    rows["axes"] = _axes(options, seeds, [(1.0 / ratio, 1.0) for ratio in AXES])
+    rows["axes_scaled"] = _axes(options, seeds, list(SCALES.values()))
     rows["readings"] = _readings(options, seeds)
     rows["gross_m"] = _gross(options, seeds)
     late, pictures = _late(options, seeds)
@@ -125,11 +132,13 @@ def _comparison(sailed: Mapping[str, Sailed]) -> dict[str, Rows]:
     }
 
 
-def _axes(options: CooperativeOptions, seeds: list[list[int]]) -> Rows:
+def _axes(
+    options: CooperativeOptions, seeds: list[list[int]], factors: Sequence[tuple[float, float]]
+) -> Rows:
     """Ratio to the centralised filter where each master is good along one axis only."""
     found: dict[str, list[FloatArray]] = {}
-    for ratio in AXES:
-        ahead, upward = (1.0 / ratio, 1.0, 1.0), (1.0, 1.0, 1.0 / ratio)
+    for good, poor in factors:
+        ahead, upward = (good, poor, poor), (poor, poor, good)
         quality = (ahead, ahead, upward)  # AUV1 sails east, AUV2 north: x, y and z
         formation = Formation(
             squared_variance=options.variance, process=options.process, quality=quality

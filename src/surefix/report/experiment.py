@@ -16,7 +16,7 @@ from surefix.report.shell import Section, page, place
 from surefix.report.style import CLEAN, FRAME, INK, MUTED, Figure, axis, layout
 from surefix.report.wording import escape, number, table
 
-__all__ = ["COLOURS", "colours_of", "widths_of", "write_experiment"]
+__all__ = ["COLOURS", "colours_of", "write_experiment"]
 
 COLOURS: Final = (
     CLEAN, "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5c3e", "#8a63d2",
@@ -54,34 +54,21 @@ def write_experiment(experiment: Experiment, path: str | Path) -> None:
 def colours_of(picture: Picture) -> dict[str, tuple[str, str]]:
     """Colour and dash of each name that is drawn as a line, in the order of appearance.
 
+    Every other line with marks is dashed: such lines often lie on each other.
+
     Returns
     -------
     colours
         Name → colour as ``#rrggbb``, and one of ``solid``, ``dash``, ``dot``.
     """
-    lines = (
-        trace.name
-        for panel in picture.panels
-        for trace in panel.traces
-        if trace.kind in ("line", "points")
-    )
-    return {
-        name: (COLOURS[i % len(COLOURS)], _DASHES[i // len(COLOURS) % len(_DASHES)])
-        for i, name in enumerate(dict.fromkeys(lines))
-    }
-
-
-def widths_of(panel: Panel) -> list[float]:
-    """Width of each trace's line, px: where marked lines may lie on each other, later ones thinner.
-
-    Returns
-    -------
-    widths
-        One per trace; 1.4 for a plain line, 3.2 down to 1.2 for lines with marks.
-    """
-    marked = sum(trace.kind == "points" for trace in panel.traces)
-    steps = iter(np.linspace(3.2, 1.2, marked).tolist() if marked > 2 else [1.6] * marked)
-    return [next(steps) if trace.kind == "points" else 1.4 for trace in panel.traces]
+    drawn = [trace for panel in picture.panels for trace in panel.traces]
+    names = dict.fromkeys(trace.name for trace in drawn if trace.kind in ("line", "points"))
+    marked = {trace.name for trace in drawn if trace.kind == "points"}
+    found = {}
+    for i, name in enumerate(names):
+        turn = i // len(COLOURS) + (name in marked and i % 2)
+        found[name] = (COLOURS[i % len(COLOURS)], _DASHES[turn % len(_DASHES)])
+    return found
 
 
 def _sections(experiment: Experiment) -> list[Section]:
@@ -149,8 +136,7 @@ def _drawn(picture: Picture) -> Figure:
         axes[f"yaxis{name}"] = _y_axis(panel, [low_y, high_y], name)
         titles.append(_title(panel.title, low_x, high_y))
         where = {"xaxis": f"x{name}", "yaxis": f"y{name}"}
-        pairs = zip(panel.traces, widths_of(panel), strict=True)
-        data += [_line(trace, named, width) | where for trace, width in pairs]
+        data += [_line(trace, named) | where for trace in panel.traces]
     return {
         "id": picture.key,
         "label": picture.title,
@@ -201,7 +187,7 @@ def _title(text: str, x: float, y: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _line(trace: Trace, named: dict[str, tuple[str, str]], width: float) -> dict[str, Any]:
+def _line(trace: Trace, named: dict[str, tuple[str, str]]) -> dict[str, Any]:
     shape: dict[str, Any] = {"type": "scatter", "name": trace.name, "x": trace.x, "y": trace.y}
     match trace.kind:
         case "truth":
@@ -214,11 +200,11 @@ def _line(trace: Trace, named: dict[str, tuple[str, str]], width: float) -> dict
             marker = {"symbol": "x-thin", "size": 6, "color": MUTED, "line": line}
             return shape | {"mode": "markers", "marker": marker}
     colour, dash = named[trace.name]
-    line = {"color": colour, "width": width} | ({"dash": dash} if dash != "solid" else {})
+    line = {"color": colour, "width": 1.6} | ({"dash": dash} if dash != "solid" else {})
     if trace.kind == "points":
         return shape | {
             "mode": "lines+markers",
             "line": line,
-            "marker": {"symbol": "circle", "size": 4.0 + width, "color": colour},
+            "marker": {"symbol": "circle", "size": 6, "color": colour},
         }
     return shape | {"mode": "lines", "line": line, "connectgaps": False}
