@@ -1,15 +1,19 @@
 """The experiment of paper 003: what it must show, on short voyages of several seeds."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
+from docs.pages import ROOT, blocks
 from surefix.errors import OptionsError
 from surefix.papers.reproduce import contents, reproduce
 from surefix.papers.ship import ShipPaperOptions, run
 from surefix.papers.ship_methods import DELAYS, METHODS, OURS, PAPER
 
+PAGE = ROOT / "docs" / "papers" / "ship.md"
+CELL = re.compile(r"(-?[\d.]+) ± ([\d.]+)|–")
 EDITORS = [name for name in METHODS if name not in ("five-point cubic", "weighted least squares")]
 
 
@@ -135,6 +139,30 @@ def test_progress_findings_and_figures(experiment):
     assert longest <= 1200
     json.dumps(contents(experiment), allow_nan=False)
     assert len(experiment.findings) == 8
+
+
+def test_the_page_shows_what_is_found():
+    """Its means over 20 voyages against the first two, within five standard errors."""
+    (shown,) = (
+        block.text for block in blocks(PAGE) if block.text.startswith("$ surefix reproduce ship\n")
+    )
+    found = run(ShipPaperOptions(runs=2))
+    for table in found.tables:
+        heading = f"{table.title}, {table.unit}" if table.unit else table.title
+        part = shown.split(f"\n{heading}\n")[1].split("\n\n")[0].splitlines()[1:]
+        for row, mean, line in zip(table.rows, table.mean, part, strict=False):
+            assert line.strip().startswith(row), f"{heading}: {line}"
+            cells = CELL.findall(line.strip().removeprefix(row))
+            assert len(cells) == len(table.columns)
+            for ours, (value, spread) in zip(mean, cells, strict=True):
+                assert np.isfinite(ours) == bool(value)
+                if value:
+                    bound = 5.0 * float(spread) / np.sqrt(2.0) + 0.02 * abs(float(value))
+                    off = abs(ours - float(value))
+                    assert off <= bound + 2.0 * 10.0**-table.digits, f"{heading}: {line}"
+    said = shown.strip().splitlines()[-len(found.findings) :]
+    for ours, theirs in zip(found.findings, said, strict=True):
+        assert re.sub(r"[\d.]+", "0", ours) == re.sub(r"[\d.]+", "0", theirs)
 
 
 def test_wrong_options():

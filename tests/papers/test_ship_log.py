@@ -118,13 +118,12 @@ def test_yachts(data, name):
     assert tables["record"].mean[:2, 1].min() > 90.0
 
 
-def test_recorded_example_gives_the_figures_of_the_page(data, monkeypatch):
-    monkeypatch.chdir(data / "ship_yachts")
+@pytest.mark.parametrize(("folder", "log"), [("ship_yachts", "irene"), ("ship_palmer", "NBP1406")])
+def test_recorded_example_gives_the_figures_of_the_page(data, monkeypatch, folder, log):
+    monkeypatch.chdir(data / folder)
     page = ROOT / "docs" / "papers" / "ship.md"
-    recorded = [block for block in blocks(page) if block.info == "recorded"]
-    assert recorded
-    for block in recorded:
-        run_console(block.text, f"{page.name}:{block.line}")
+    (block,) = (block for block in blocks(page) if f"--log {log}" in block.text)
+    run_console(block.text, f"{page.name}:{block.line}")
 
 
 def test_receivers_of_a_research_vessel_agree(data):

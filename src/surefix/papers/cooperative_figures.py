@@ -204,7 +204,7 @@ def _late(late: Mapping[str, FloatArray], ratio: Table) -> Figure:
         "timely, gain weights",
         "replay of observations",
     )
-    channel = np.arange(1.0, len(ratio.columns) + 1.0)
+    channel = np.arange(float(len(ratio.columns)))
     panels = (
         Panel(
             title=f"Error, {ratio.columns[-1]}",
@@ -214,7 +214,8 @@ def _late(late: Mapping[str, FloatArray], ratio: Table) -> Figure:
         ),
         Panel(
             title="From good to bad channels",
-            x_label="1 own periods, 2 + delay, 3 + loss, 4 + disorder",
+            x_label="",
+            x_names=ratio.columns,
             y_label="RMSE ÷ centralised",
             traces=tuple(Trace(name, channel, _row(ratio, name), "points") for name in drawn),
         ),
