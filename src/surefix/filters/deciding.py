@@ -47,7 +47,7 @@ _GAIN = 0.5
 _LONGEST = 20  # rejected samples on end after which the recursion believes them
 _MISSED = _WINDOW // 2  # usual steps without a sample that it bridges
 
-THRESHOLDS = {"53h": 4.0, "hampel": 3.0, "median": 5.0}
+THRESHOLDS = {"53h": 4.0, "hampel": 4.0, "median": 5.0}
 """Names of the cleaners, and k₀ of each unless it is given."""
 AHEAD = {"53h": DELAY, "hampel": 2 * (_HAMPEL // 2), "median": 0}
 """How many later samples each of them looks at."""
