@@ -113,7 +113,10 @@ def clean(
         Literal["auto", "cv", "ca"] | None,
         typer.Option(help="Motion: constant velocity or acceleration; default auto, the likelier."),
     ] = None,
-    k0: Annotated[float | None, typer.Option(help="Where down-weighting begins, in σ.")] = None,
+    k0: Annotated[
+        float | None,
+        typer.Option(help="Where down-weighting begins, in σ; with a cleaner, rejection."),
+    ] = None,
     k1: Annotated[float | None, typer.Option(help="Where rejection begins, in σ.")] = None,
     lag: Annotated[
         str | None, typer.Option(metavar="DURATION", help="Future seen in the lagged mode.")

@@ -19,8 +19,9 @@ from surefix.io.roles import ALIASES, ROLES, UNITS
 from surefix.pipelines import deliver
 from surefix.pipelines.channels import CHANNEL_HEAD
 from surefix.pipelines.clean import HEAD
+from surefix.pipelines.options import METHODS, MULTI_HYPOTHESIS
 from surefix.reasons import texts
-from surefix.robust.loss import LOSSES, loss_named
+from surefix.robust.loss import LOSSES
 from surefix.types import Reason, Verdict, Verdicts
 
 DOCS = ROOT / "docs"
@@ -161,10 +162,11 @@ def test_method_constants_are_those_of_the_code():
     text = (DOCS / "reference/options.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([\w-]+)` \| ([\d.–]+) \| ([\d.–]+)", text, re.M)
     found = {name: (k0, k1) for name, k0, k1 in rows}
-    assert set(found) == set(LOSSES)
+    assert set(found) == set(METHODS) - {MULTI_HYPOTHESIS}
     for name, (k0, k1) in found.items():
-        loss = loss_named(name)
-        for shown, value in ((k0, loss.k0), (k1, loss.k1)):
+        options = surefix.CleanOptions(method=name)
+        used = options.decider.k0 if options.decider else options.loss.k0
+        for shown, value in ((k0, used), (k1, options.loss.k1)):
             assert (float(shown) if shown != "–" else 0.0) == pytest.approx(value, abs=0.005)
 
 
