@@ -18,7 +18,7 @@ from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.multi_hypothesis_modes import decide_offline
-from surefix.filters.noise import NoiseFigures, Observations, sample_of, variances
+from surefix.filters.noise import NoiseFigures, Observations, initial_scales, sample_of, variances
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray
@@ -36,7 +36,9 @@ _SHARES = {
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
-_TOO_SMALL = 0.3  # median innovation, in standard deviations, of figures that are too large
+_FEWEST = 0.1  # share of good triples of neighbours that tell the scale of differences …
+_DIFFER = 0.25  # … and share of the scale of differences that no figure to begin with falls below
+_MANY = 0.2  # share of gross errors supposed meanwhile
 _BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
 _LEAST = 0.3  # share of the figures begun with that none falls below
@@ -250,22 +252,24 @@ def _begun(
 ) -> NoiseFigures:
     """The likeliest of a few figures to begin with, if many gross errors made ``first`` too large.
 
-    The median of the standardised innovations shows that: it is 0.67 where the figures are right.
+    None is far below what neighbouring fixes differ by: smooth errors would look like none at all.
     """
     free = np.isnan(given.position)
-    moving = motion._replace(density=np.full(motion.axes, first.process**2))
-    bank = no_hypotheses(motion, _BRIEFLY)
-    _, found, _ = filter_hypotheses(moving, prior, _epochs(sample, first), bank, traced=False)
-    seen = np.where(np.isfinite(found.weight), np.abs(found.standardised), np.nan)[_BEGIN:]
-    usual = seen[:, : motion.axes]
-    if not np.isfinite(usual).any() or np.nanmedian(usual) > _TOO_SMALL:
-        return first
+    unknown = np.full_like(first.position, np.nan)
+    positions = slice(0, motion.axes)
+    differ = initial_scales(sample, unknown, positions, motion.period, _FEWEST)
+    least = np.fmin(first.position, np.fmax(_DIFFER * differ, floor[0]))
     trials = []
     for shrink in _SHRINKS:
-        smaller = np.maximum(first.position * shrink, floor[0])
+        smaller = np.fmax(first.position * shrink, least)
         position = np.where(free, smaller, first.position)
         trials.append(first._replace(position=position))
-    reached = [_evidence(motion, t, prior, _epochs(sample, t), _BRIEFLY) for t in trials]
+    reached = []
+    for trial in trials:
+        spread = prior.spread.copy()
+        spread[: motion.axes] = _WILD * _usual(trial)[0]
+        ready = prior._replace(isolated=_MANY, spread=spread)
+        reached.append(_evidence(motion, trial, ready, _epochs(sample, trial), _BRIEFLY))
     return trials[int(np.argmax(reached))]
 
 

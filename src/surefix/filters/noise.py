@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import ndtri
 
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import filter_track, start
@@ -23,6 +24,7 @@ __all__ = [
     "difference_scale",
     "estimate_noise",
     "grain",
+    "initial_scales",
     "sample_of",
     "speed_scale",
     "variances",
@@ -30,7 +32,6 @@ __all__ = [
 
 _OUTLIERS = 0.05  # prior share of gross errors
 _WINDOW = 100.0  # width of the window gross errors fall in, in initial standard deviations
-_Q25 = 0.31864  # 25 % quantile of |N(0, 1)|
 _SAMPLE = 2000  # epochs the likelihood is evaluated on
 _FEW = 30  # rows that a sensor needs for a figure of its own, where there are others
 _SHRINKS = (0.0, -1.4, -2.8)  # logarithms by which the initial figures are tried smaller
@@ -72,7 +73,9 @@ class NoiseFigures(NamedTuple):
     cost: float = 0.0
 
 
-def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> float:
+def difference_scale(
+    time: FloatArray, z: FloatArray, period: float = 0.0, share: float = 0.25
+) -> float:
     """Standard deviation of the noise of a series, from each value and its two neighbours.
 
     ``z_k`` minus the straight line between its neighbours has variance ``σ²(1 + a² + b²)``; the
@@ -83,6 +86,8 @@ def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> fl
     ----------
     time, z
         (n,) series without NaN; ``period`` > 0 for angles.
+    share
+        The quantile. Less survives more bad triples, but knows the scale less well.
 
     >>> difference_scale(np.arange(5.0), np.array([0.0, 1.0, 2.0, 3.0, 4.0]))
     0.0
@@ -96,10 +101,10 @@ def difference_scale(time: FloatArray, z: FloatArray, period: float = 0.0) -> fl
     a = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
     residual = y[1:-1] - (a * y[:-2] + (1.0 - a) * y[2:])
     normalised: FloatArray = np.abs(residual) / np.sqrt(1.0 + a**2 + (1.0 - a) ** 2)
-    quarter = float(np.quantile(normalised, 0.25))
-    if quarter == 0.0 and (normalised > 0.0).any():  # coarse digits: most differences are nought
-        quarter = float(np.quantile(normalised[normalised > 0.0], 0.25))
-    return quarter / _Q25
+    small = float(np.quantile(normalised, share))
+    if small == 0.0 and (normalised > 0.0).any():  # coarse digits: most differences are nought
+        small = float(np.quantile(normalised[normalised > 0.0], share))
+    return small / float(ndtri(0.5 + 0.5 * share))
 
 
 def grain(values: FloatArray) -> float:
@@ -147,8 +152,8 @@ def estimate_noise(
     """
     sample = sample_of(observations)
     axes = sample.z.shape[1] // 2
-    start_position = _initial(sample, given.position, slice(0, axes), period)
-    start_velocity = _initial(sample, given.velocity, slice(axes, 2 * axes), 0.0)
+    start_position = initial_scales(sample, given.position, slice(0, axes), period)
+    start_velocity = initial_scales(sample, given.velocity, slice(axes, 2 * axes), 0.0)
     floor = max(quantum / np.sqrt(12.0), 1e-9)
     floor_velocity = max(velocity_quantum / np.sqrt(12.0), 1e-9)
     position, velocity = np.fmax(start_position, floor), np.fmax(start_velocity, floor_velocity)
@@ -245,7 +250,13 @@ def _blocks(rows: IntArray, size: int) -> list[tuple[int, int]]:
     return [(int(rows[s]), int(rows[s + length - 1])) for s in starts]
 
 
-def _initial(sample: Observations, given: FloatArray, columns: slice, period: float) -> FloatArray:
+def initial_scales(
+    sample: Observations,
+    given: FloatArray,
+    columns: slice,
+    period: float,
+    share: float = 0.25,
+) -> FloatArray:
     """Per sensor: the given figure, or the difference scale over the axes; NaN if unobserved."""
     out = given.copy()
     for sensor in range(len(given)):
@@ -253,7 +264,7 @@ def _initial(sample: Observations, given: FloatArray, columns: slice, period: fl
         scales = []
         for c in range(*columns.indices(sample.z.shape[1])):
             seen = rows & np.isfinite(sample.z[:, c])
-            scales.append(difference_scale(sample.time[seen], sample.z[seen, c], period))
+            scales.append(difference_scale(sample.time[seen], sample.z[seen, c], period, share))
             if not np.isfinite(scales[-1]) and seen.any():
                 scales[-1] = 1.0
         usable = [s for s in scales if np.isfinite(s)]
