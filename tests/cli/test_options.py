@@ -74,7 +74,7 @@ def test_wrong_options_files(log, tmp_path, text, words):
     ("words", "told"),
     [
         (["--mode", "fast"], ["'fast'", "realtime", "lagged", "offline"]),
-        (["--method", "median"], ["'median'", "igg3", "student-t"]),
+        (["--method", "mean"], ["'mean'", "igg3", "student-t"]),
         (["--model", "cj"], ["'cj'", "cv"]),
         (["--lag", "soon"], ["--lag", "'soon'", "200ms"]),
         (["--every", "0"], ["every", "above zero"]),
