@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reference.registration import joint_least_squares
 from surefix.errors import OptionsError
 from surefix.fusion.registration import reference_bias, register
 from surefix.models.radar import site, to_polar
@@ -44,6 +45,22 @@ def test_errors_are_found_as_well_as_the_covariance_says(radars):
         assert found.scale == pytest.approx(1.0, abs=0.1)
     assert np.mean(squares) / (3 * radars) == pytest.approx(1.0, abs=0.35)
     assert np.median(plain) < 0.15
+
+
+@pytest.mark.parametrize(("seed", "radars"), [(1, 2), (2, 2), (3, 3)])
+def test_plain_registration_is_least_squares_with_the_positions_unknown(seed, radars):
+    """The noise is scaled by the misfits."""
+    where = course(25)
+    z, _ = measured(seed, radars, where)
+    found = register(z, SITES[:radars], SIGMA[:radars], loss=loss_named("kalman"))
+    origins = [each.position for each in SITES[:radars]]
+    prior = np.array([1000.0, 0.05, 0.05])
+    bias, covariance = joint_least_squares(
+        np.array(z), origins, found.scale * SIGMA[:radars], prior, where
+    )
+    sigma = np.sqrt(np.diag(covariance)).reshape(radars, 3)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), sigma.ravel(), rtol=0.02)
+    assert np.abs((found.bias - bias) / sigma).max() < 0.05
 
 
 def test_noise_stated_too_small_is_scaled():

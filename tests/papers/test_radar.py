@@ -50,6 +50,14 @@ def test_a_small_q_diverges_in_the_manoeuvre_and_the_current_model_does_not(mean
     assert mean("manoeuvre_m", OURS, "Z RMSE") < 0.5 * slow
 
 
+def test_the_acceleration_form_holds_only_with_feedback(mean):
+    for part in ("straight_m", "manoeuvre_m"):
+        column = "Y" if part == "straight_m" else "Y RMSE"
+        plain = mean(part, "medians, feedback", column)
+        assert plain < mean(part, "medians, feedback, acceleration", column) < 2.5 * plain
+        assert mean(part, "medians, printed, acceleration", column) > 10.0 * plain
+
+
 def test_told_kalman_is_better_on_the_straight_legs(mean):
     assert mean("straight_m", TOLD_CV, "Y") < 0.7 * mean("straight_m", OURS, "Y")
 

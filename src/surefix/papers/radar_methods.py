@@ -25,7 +25,9 @@ __all__ = [
     "COUNTED",
     "CURRENT",
     "OURS",
+    "OURS_CA",
     "PRINTED",
+    "PRINTED_CA",
     "ROBUST",
     "TOLD",
     "TOLD_CV",
@@ -45,6 +47,8 @@ BEFORE: Final = "before filtering"
 CURRENT: Final = "current statistical"
 PRINTED: Final = "medians, printed"
 OURS: Final = "medians, feedback"
+PRINTED_CA: Final = "medians, printed, acceleration"
+OURS_CA: Final = "medians, feedback, acceleration"
 ROBUST: Final = "IGG3 Kalman, 20Q0"
 TOLD: Final = "oracle"
 TOLD_CV: Final = "CV Kalman, 20Q0, told"
@@ -183,8 +187,9 @@ def filter_one(
     }
     found = {BEFORE: series.position} | cv
     found[CURRENT] = current_statistical(series, flight.dt)
-    for name, form in ((PRINTED, "printed"), (OURS, "feedback")):
-        options = median_recursion(form, window=window)
+    forms = ((PRINTED, "printed", "cv"), (OURS, "feedback", "cv"))
+    for name, form, model in (*forms, (PRINTED_CA, "printed", "ca"), (OURS_CA, "feedback", "ca")):
+        options = median_recursion(form, model=model, window=window)
         found[name] = filter_medians(options, series.position)[1].estimate
     found[ROBUST] = filter_cv(series, flight.dt, _FACTORS[-1] * density, robust=True)[1]
     found[TOLD_CV] = filter_cv(_told(flight, series), flight.dt, _FACTORS[-1] * density)[1]
