@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,7 +63,8 @@ def tell(
     """
     from surefix.papers.reproduce import text_lines, write_json
 
-    for line in text_lines(printed):
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for line in text_lines(printed, width):
         typer.echo(line)
     if json_file is not None:
         write_json(experiment, json_file)

@@ -123,12 +123,22 @@ def write_json(experiment: Experiment, path: str | Path) -> None:
         file.write(f"{text}\n".encode())
 
 
-def text_lines(experiment: Experiment) -> list[str]:
-    """Give an experiment as lines of text: each table with means, spreads, and printed figures."""
+def text_lines(experiment: Experiment, width: int | None = None) -> list[str]:
+    """Give an experiment as lines of text: each table with means, spreads, and printed figures.
+
+    Parameters
+    ----------
+    experiment
+        From `reproduce`.
+    width
+        Characters of a line; a wider table is given in parts, each with the names of the rows.
+        None for one line a row.
+    """
     lines = [experiment.title, experiment.source]
-    lines.append(f"seed {experiment.seed}, {_counted(experiment.runs)}: mean ± spread of the runs")
+    several = ": mean ± spread of the runs" if experiment.runs > 1 else ""
+    lines.append(f"seed {experiment.seed}, {_counted(experiment.runs)}{several}")
     for table in experiment.tables:
-        lines += ["", _heading(table), *_aligned(table)]
+        lines += ["", _heading(table), *_aligned(table, width)]
         lines += [f"  {table.note}"] if table.note else []
     return [*lines, *([""] if experiment.findings else []), *experiment.findings]
 
@@ -149,7 +159,7 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _aligned(table: Table) -> list[str]:
+def _aligned(table: Table, width: int | None) -> list[str]:
     """Columns of equal width; a printed row follows its own as ``paper``."""
     grid = [["", *table.columns]]
     for row, mean, spread in zip(table.rows, table.mean, table.spread, strict=True):
@@ -159,10 +169,26 @@ def _aligned(table: Table) -> list[str]:
             shown = (_figure(v, math.nan, table.digits) for v in table.printed[row])
             grid.append(["  paper", *shown])
     widths = [max(map(len, column)) for column in zip(*grid, strict=True)]
-    return [
-        "  ".join(["  " + line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])]).rstrip()
-        for line in grid
-    ]
+    lines: list[str] = []
+    for part in _parts(widths, width):
+        lines += [
+            "  ".join(
+                ["  " + line[0].ljust(widths[0]), *(line[i].rjust(widths[i]) for i in part)]
+            ).rstrip()
+            for line in grid
+        ]
+    return lines
+
+
+def _parts(widths: list[int], width: int | None) -> list[list[int]]:
+    """Columns 1, 2 … in groups that fit beside column 0, at least one in each."""
+    parts: list[list[int]] = [[]]
+    for i in range(1, len(widths)):
+        wide = 2 + widths[0] + sum(2 + widths[j] for j in (*parts[-1], i))
+        if width is not None and wide > width and parts[-1]:
+            parts.append([])
+        parts[-1].append(i)
+    return parts
 
 
 def _figure(mean: float, spread: float, digits: int) -> str:
