@@ -1,0 +1,181 @@
+"""Noise figures and priors that the multi-hypothesis filter learns, against what was put in."""
+
+import numpy as np
+import pytest
+
+from surefix.filters.learning import learn, supposed
+from surefix.filters.noise import NoiseFigures, Observations, estimate_noise
+from surefix.simulate.contamination import alone, draw, draw_world
+
+UNKNOWN = NoiseFigures(np.array([np.nan]), np.array([np.nan]), np.nan)
+TINY = (1e-9, 1e-9)
+
+
+def trial_of(name, kind, seed, *, axes=2, epochs=600):
+    world = draw_world([13, seed], epochs=epochs, axes=axes)
+    trial = draw(name, world, [13, seed])
+    return alone(trial) if kind == "alone" else trial
+
+
+def observed(trial):
+    n, d = trial.fixes.shape
+    z = np.hstack([trial.fixes, trial.velocities])
+    return Observations(trial.time, z, np.zeros(n, np.int64), np.full((n, 2 * d), np.nan))
+
+
+def learnt(trial, given=UNKNOWN, *, floor=TINY, first=None):
+    seen, world = observed(trial), trial.world
+    begin = estimate_noise(seen, given) if first is None else first
+    speed = 20.0 * world.sigma_m / world.interval_s
+    return learn(
+        seen,
+        given,
+        begin,
+        order=2,
+        period=0.0,
+        speed=speed,
+        longest=39.5 * world.interval_s,
+        floor=floor,
+    )
+
+
+def figures_of(trial, found):
+    """Logarithms of position noise, process noise and, where there are any, velocity noise."""
+    world = trial.world
+    pairs = [(found.position[0], world.sigma_m), (found.process, world.process)]
+    if trial.aided:
+        pairs.append((found.velocity[0], world.sigma_mps))
+    return [np.log(told / true) for told, true in pairs]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("clean", "alone"),
+        ("isolated-20", "aided"),
+        ("isolated-40", "alone"),
+        ("isolated-40", "aided"),
+    ],
+)
+def test_figures_are_found(name, kind):
+    """However many fixes are wrong."""
+    errors = []
+    for seed in range(4):
+        trial = trial_of(name, kind, seed)
+        errors.append(figures_of(trial, learnt(trial).figures))
+    assert (np.median(np.abs(errors), axis=0) < 0.1).all()
+    assert np.max(np.abs(errors)) < 0.25
+    assert np.abs(np.array(errors)[:, 0]).max() < 0.1
+
+
+@pytest.mark.parametrize("name", ["dvl-faults", "one-axis", "burst-common", "jump"])
+def test_faults_of_other_kinds_do_not_count_in_the_noise(name):
+    trial = trial_of(name, "aided", 4)
+    found = figures_of(trial, learnt(trial).figures)
+    assert np.max(np.abs(found)) < 0.2
+    assert abs(found[0]) < 0.1
+
+
+def test_the_prior_is_what_the_log_shows():
+    """Shares of the fixes that are wrong, and about how far."""
+    for name, share in (("isolated-20", 0.2), ("isolated-40", 0.4), ("clean", 0.0)):
+        trial = trial_of(name, "alone", 4)
+        prior = learnt(trial).prior
+        assert prior.isolated == pytest.approx(share, abs=0.02 + 0.1 * share)
+        assert prior.partial < 0.03
+        assert prior.poor < 0.05
+        if share:
+            size = np.median(np.abs(trial.fixes - trial.position)[trial.bad_fix])
+            assert 0.7 * size < prior.spread[0] < 1.4 * size
+            assert prior.spread[0] == prior.spread[1]
+    prior = learnt(trial_of("one-axis", "alone", 4)).prior
+    assert prior.partial == pytest.approx(0.2, abs=0.04)
+    assert prior.isolated < 0.04
+
+
+def test_what_the_user_knows_stays():
+    """Even where it is far off; the rest is learnt with it."""
+    trial = trial_of("isolated-20", "aided", 0)
+    world = trial.world
+    true = [world.sigma_m, world.sigma_mps, world.process]
+    for which, factor in ((0, 1.0), (1, 2.0), (2, 0.5), (0, 3.0)):
+        told = [np.nan, np.nan, np.nan]
+        told[which] = true[which] * factor
+        given = NoiseFigures(np.array(told[:1]), np.array(told[1:2]), told[2])
+        found = learnt(trial, given).figures
+        values = [found.position[0], found.velocity[0], found.process]
+        assert values[which] == told[which]
+        if factor == 1.0:
+            assert np.abs(np.log(np.array(values) / true)).max() < 0.2
+    given = NoiseFigures(np.array(true[:1]), np.array(true[1:2]), true[2])
+    found = learnt(trial, given, first=given).figures
+    assert (found.position[0], found.velocity[0], found.process) == tuple(true)
+
+
+@pytest.mark.parametrize("kind", ["aided", "alone"])
+def test_no_figure_falls_below_the_resolution(kind):
+    trial = trial_of("isolated-20", kind, 2)
+    floor = (1.5 * trial.world.sigma_m, 2.5 * trial.world.sigma_mps)
+    found = learnt(trial, floor=floor).figures
+    assert found.position[0] >= floor[0]
+    assert found.position[0] < 1.1 * floor[0]
+    if kind == "aided":
+        assert found.velocity[0] >= floor[1]
+
+
+def test_every_sensor_has_figures_of_its_own():
+    trial = trial_of("isolated-20", "alone", 4)
+    n = len(trial.time)
+    rng = np.random.default_rng(0)
+    sensor = np.arange(n) % 2
+    worse = 3.0 * trial.world.sigma_m
+    fixes = trial.fixes.copy()
+    fixes[sensor == 1] += rng.normal(size=(n, 2))[sensor == 1] * np.sqrt(8.0) * trial.world.sigma_m
+    seen = observed(trial)
+    seen = seen._replace(z=np.hstack([fixes, trial.velocities]), sensor=sensor)
+    given = NoiseFigures(np.full(2, np.nan), np.full(2, np.nan), np.nan)
+    begin = estimate_noise(seen, given)
+    longest, speed = 39.5 * trial.world.interval_s, 20.0 * trial.world.sigma_m
+    found = learn(
+        seen, given, begin, order=2, period=0.0, speed=speed, longest=longest, floor=TINY
+    ).figures
+    assert found.position[0] == pytest.approx(trial.world.sigma_m, rel=0.1)
+    assert found.position[1] == pytest.approx(worse, rel=0.1)
+
+
+def test_an_angle():
+    rng = np.random.default_rng(1)
+    n = 600
+    true = np.cumsum(rng.normal(size=n) * 0.3)
+    z = np.stack([(true + rng.normal(size=n) * 2.0) % 360.0, np.full(n, np.nan)], axis=1)
+    z[5::11, 0] = (z[5::11, 0] + 120.0) % 360.0
+    seen = Observations(
+        np.arange(n, dtype=float), z, np.zeros(n, np.int64), np.full((n, 2), np.nan)
+    )
+    begin = estimate_noise(seen, UNKNOWN, period=360.0)
+    found = learn(seen, UNKNOWN, begin, order=2, period=360.0, speed=10.0, longest=39.5, floor=TINY)
+    assert found.figures.position[0] == pytest.approx(2.0, rel=0.15)
+    assert found.prior.isolated == pytest.approx(1 / 11, abs=0.03)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_too_little_to_learn_from(n):
+    """The figures begun with, and the usual prior."""
+    trial = trial_of("clean", "alone", 0)
+    whole = observed(trial)
+    seen = Observations(*(field[:n] for field in whole))
+    first = NoiseFigures(np.array([2.0]), np.array([np.nan]), 0.1)
+    found = learn(seen, UNKNOWN, first, order=2, period=0.0, speed=3.0, longest=40.0, floor=TINY)
+    assert found.figures == first
+    usual = supposed(2, 2.0, 1.0, 3.0, 40.0)
+    for a, b in zip(found.prior, usual, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_nothing_is_modified():
+    trial = trial_of("isolated-20", "aided", 4)
+    seen = observed(trial)
+    before = [field.copy() for field in seen]
+    one, other = learnt(trial), learnt(trial)
+    assert one.figures.process == other.figures.process
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, seen, strict=True))
