@@ -136,12 +136,8 @@ def test_weights_are_probabilities_and_covariances_are_ones(order, axes):
         assert (found.weight[0, known] <= 1.0 + 1e-9).all()
 
 
-NEES = [
-    (axes, velocity, irregular)
-    for axes in (1, 2, 3)
-    for velocity in (None, 0.1)
-    for irregular in (False, True)
-]
+NEES = [(axes, velocity, True) for axes in (1, 2, 3) for velocity in (None, 0.1)]
+NEES += [(2, None, False), (3, 0.1, False)]
 
 
 @pytest.mark.parametrize(("axes", "velocity", "irregular"), NEES)

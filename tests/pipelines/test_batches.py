@@ -105,6 +105,13 @@ def test_chunks_do_not_change_the_fixes(sizes, options):
     equal(join(few), join(many), within=1e-6 if options else 0.0)
 
 
+def test_chunks_do_not_change_what_several_hypotheses_say():
+    few = realtime([HEAD + 30], method="multi-hypothesis")
+    many = realtime([HEAD + 30, 1, 1, 1, *[7] * 30, 250], method="multi-hypothesis")
+    assert len(many) > len(few)
+    equal(join(few), join(many))
+
+
 @pytest.mark.parametrize("pieces", [[1] * 90, [33] * 6, [HEAD // 2]])
 def test_the_head_does_not_depend_on_the_chunks(pieces):
     """Origin and noise are learnt on the first rows, whatever pieces these arrive in."""
