@@ -319,6 +319,28 @@ def test_a_run_of_one_sensor_leaves_the_other():
         assert found.run[127] == 24
 
 
+@pytest.mark.parametrize("depth", [False, True])
+def test_a_sensor_that_is_off_for_good(depth):
+    """As long as another one denies it the track does not follow; a depth alone has no say."""
+    for seed in range(3):
+        truth, z = line(seed, 300, 3)
+        sensor = np.arange(300) % 2
+        z[(sensor == 1) & (np.arange(300) >= 80)] += [25.0, -40.0, 0.0]
+        z[200:][sensor[200:] == 0] = np.nan
+        if depth:
+            z[sensor == 0, :2] = np.nan
+        motion, epochs = single(z, sensor=sensor)
+        _, found, _ = run(motion, prior_of(motion), epochs)
+        jumps = found.since[np.isfinite(found.since)]
+        error = np.abs(found.mean[:, :3] - truth)
+        assert len(jumps) == 1
+        last = 80 if depth else 198
+        assert last <= jumps[0] <= last + 2
+        assert error[20:last].max() < 2.5
+        truth += np.array([25.0, -40.0, 0.0])
+        assert np.abs(found.mean[last + 50 :, :3] - truth[last + 50 :]).max() < 3.0
+
+
 def test_a_run_lasts_and_is_a_jump():
     """Told once, when it has lasted too long, and dated to its first fix."""
     for seed in range(4):

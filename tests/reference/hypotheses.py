@@ -276,13 +276,10 @@ def _position(motion, prior, account, known, z, r, time, sensor, step):
         gain = belongs if unknown else np.logaddexp(usual, noisy)
         gain += np.log(1.0 - prior.isolated - prior.partial - prior.burst)
         is_poor = noisy > usual and not unknown
-        out.append(
-            _told(
-                used(account, axes, POOR * r if is_poor else r),
-                gain,
-                "poor" if is_poor else "belongs",
-            )
-        )
+        good = used(account, axes, POOR * r if is_poor else r)
+        if running and not unknown and belongs - shifted > PREFERS:
+            good = good._replace(opened=time)  # the run is not a jump, up to now
+        out.append(_told(good, gain, "poor" if is_poor else "belongs"))
         out += _partial(prior, account, axes, inside, wild, used)
         confirmed = running and not unknown and account.length >= CONFIRMED
         if confirmed and shifted - belongs > PREFERS:

@@ -12,6 +12,7 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = [
     "COMMIT",
     "CONTINUE",
+    "DENY",
     "DROP",
     "MOST",
     "MOST_SENSORS",
@@ -42,6 +43,7 @@ COMMIT: Final = 64
 VELOCITY_OUT: Final = 128
 POOR: Final = 256
 VELOCITY_POOR: Final = 512
+DENY: Final = 1024
 
 POOR_WEIGHT: Final = 0.25
 """Weight of an observation that belongs to the track but is twice as noisy as usual."""
@@ -108,7 +110,7 @@ class Bank(NamedTuple):
     run
         (k,) sensor whose fixes run with a common offset, −1 outside of runs.
     opened
-        (k,) s, when that run began.
+        (k,) s, when that run began, or when another sensor last denied it.
     length
         (k,) fixes of the run so far.
     faulty

@@ -6,7 +6,17 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import COMMIT, CONTINUE, DROP, OPEN, POOR, POOR_WEIGHT, Bank, Found
+from surefix.filters.hypotheses import (
+    COMMIT,
+    CONTINUE,
+    DENY,
+    DROP,
+    OPEN,
+    POOR,
+    POOR_WEIGHT,
+    Bank,
+    Found,
+)
 from surefix.filters.hypothesis_axis import commit, forget, open_run, update_axis
 from surefix.filters.hypothesis_branches import wrapped
 from surefix.filters.records import Motion
@@ -110,6 +120,8 @@ def apply_position(
     elif code & COMMIT:
         bank.run[k] = -1
         bank.began[k] = bank.opened[k]
+    elif code & DENY:
+        bank.opened[k] = time
     for a in range(motion.axes):
         m = bank.mean[k, a]
         P = bank.covariance[k, a]

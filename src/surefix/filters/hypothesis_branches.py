@@ -9,6 +9,7 @@ import numpy as np
 from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
+    DENY,
     DROP,
     OPEN,
     POOR,
@@ -39,7 +40,7 @@ CONFIRMED = 3
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
-_PREFERS = 3.0  # nats by which another sensor must prefer the offset to confirm a jump
+_PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -221,6 +222,8 @@ def position_branches(
             score[total] = base + math.log(staying)
             score[total] += belongs if unknown else _log_sum(usual, noisy)
             code[total] = POOR if noisy > usual and not unknown else 0
+            if bank.run[k] >= 0 and not unknown and belongs - offset > _PREFERS:
+                code[total] |= DENY
         parent[total] = k
         total += 1
         score[total] = base + outside + math.log(prior.isolated)
