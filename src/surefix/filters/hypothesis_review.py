@@ -75,7 +75,7 @@ def review(
     smoothed
         What the used ones say.
     locked
-        (n,) epochs whose fixes stay out: they belong to a run.
+        (n, 2) epochs whose position, and whose velocity, stays out: they belong to a run.
 
     Returns
     -------
@@ -168,6 +168,8 @@ def _review(
                 scale += 0.5 * math.log(wide[a])
             if seen == 0:
                 continue
+            if locked[k, part]:
+                continue
             if part == 1:
                 outside = log_wild(square, scale, seen) + math.log(prior.velocity)
                 good = belongs + math.log((1.0 - prior.velocity) * (1.0 - prior.poor))
@@ -175,8 +177,6 @@ def _review(
                 w = 1.0 if good >= fair else POOR_WEIGHT
                 for a in range(axes):
                     out[k, axes + a] = w if max(good, fair) >= outside else 0.0
-                continue
-            if locked[k]:
                 continue
             mask = _patterns(axes, prior, inside, poor, wild, wide, seen)
             for a in range(axes):

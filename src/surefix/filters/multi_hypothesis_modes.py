@@ -142,7 +142,9 @@ def decide_offline(
         _in_both(epochs.time, ahead.jump, back.jump[::-1], prior.longest),
         ahead.run & back.run[::-1],
     )
-    locked = said.run > 0
+    d = motion.axes
+    slipped = np.maximum(ahead.fixed[:, d], back.fixed[::-1, d]) == 0.0
+    locked = np.column_stack([said.run > 0, slipped])
     for _ in range(_SWEEPS):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered)

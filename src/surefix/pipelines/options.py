@@ -127,9 +127,14 @@ class CleanOptions:
 
     @property
     def loss(self) -> Loss:
-        """The robust loss these options ask for; none for several hypotheses or a cleaner."""
-        if self.method == MULTI_HYPOTHESIS or self.decider is not None:
+        """The robust loss these options ask for; none for a cleaner.
+
+        Several hypotheses take positions alone; the series beside them go through IGG3.
+        """
+        if self.decider is not None:
             return loss_named("kalman")
+        if self.method == MULTI_HYPOTHESIS:
+            return loss_named("igg3")
         if self.method == _CIPRA_ROMERA:
             return loss_named("huber", k0=self.k0)._replace(by_noise=1)
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
