@@ -15,7 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
-from surefix.cli_experiment import JsonFile, Report, Seed, check_report, tell
+from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
 
@@ -269,6 +269,7 @@ def reproduce(
     from surefix.papers.reproduce import reproduce as run
 
     check_report(report)
+    check_place("--json", json_file)
     _keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
     with over_runs(runs) as told:
         experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)

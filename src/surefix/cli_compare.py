@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from surefix.cli_experiment import JsonFile, Report, Seed, check_report, tell
+from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_progress import over_runs
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ def compare(
     most = min(os.cpu_count() or 1, options.trials)
     options = replace(options, jobs=most if jobs is None else jobs)
     check_report(report)
+    check_place("--json", json_file)
     with over_runs(options.trials) as told:
         found = run(options, told)
     shown = [table for table in found.tables if table.key.startswith(_PRINTED)]

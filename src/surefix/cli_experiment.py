@@ -14,7 +14,7 @@ from surefix.errors import OptionsError
 if TYPE_CHECKING:
     from surefix.experiment import Experiment
 
-__all__ = ["JsonFile", "Report", "Seed", "check_report", "tell"]
+__all__ = ["JsonFile", "Report", "Seed", "check_place", "check_report", "tell"]
 
 Seed = Annotated[int, typer.Option(help="What everything is drawn from.")]
 JsonFile = Annotated[
@@ -40,6 +40,19 @@ def check_report(path: Path | None) -> None:
     check_extra()
     if path.suffix.lower() not in (".html", ".htm"):
         raise OptionsError(f"--report {path}", "a name that ends in .html")
+    check_place("--report", path)
+
+
+def check_place(option: str, path: Path | None) -> None:
+    """Refuse a file in a directory that is not there, before the work is done.
+
+    Raises
+    ------
+    OptionsError
+        There is no such directory.
+    """
+    if path is not None and not path.absolute().parent.is_dir():
+        raise OptionsError(f"{option} {path}", "a file in a directory that exists")
 
 
 def tell(
