@@ -156,13 +156,13 @@ def test_the_review_finds_what_is_wrong_and_what_is_not(axes):
     fixed[[20, 60]] = 0.0  # rightly
     fixed[40, 0] = 0.0
     fixed[[30, 50], :axes] = 0.0  # wrongly
-    fixed[70, axes:] = 0.0
+    fixed[[70, 75], axes:] = 0.0
     user = np.full(z.shape, np.nan)
     user[80, 0], user[20, 0] = 0.0, np.nan
     epochs = made.epochs._replace(z=z, fixed=user)
     smoothed = fitted(made._replace(epochs=made.epochs._replace(z=z)), fixed)
-    locked = np.zeros(120, np.bool_)
-    locked[50] = True
+    locked = np.zeros((120, 2), np.bool_)
+    locked[50, 0], locked[75, 1] = True, True
     before = fixed.copy()
     out = review(made.motion, prior, epochs, fixed, smoothed, locked)
     np.testing.assert_array_equal(fixed, before)
@@ -174,5 +174,6 @@ def test_the_review_finds_what_is_wrong_and_what_is_not(axes):
     assert (out[30, :axes] > 0.0).all()
     assert (out[50, :axes] == 0.0).all()
     assert (out[70, axes:] > 0.0).all()
+    assert (out[75, axes:] == 0.0).all()
     assert out[80, 0] == 0.0
     assert (out == 1.0).mean() > 0.85
