@@ -19,7 +19,7 @@ def test_figures_go_to_json_and_report(tmp_path):
         assert all(len(row) == 3 for row in rows.values())
     assert "Huber" in done.out
     page = places[1].read_text(encoding="utf-8").split("<script>")[0]
-    assert "Root mean square error" in page
+    assert "Findings" in page
     assert "://" not in page
 
 
