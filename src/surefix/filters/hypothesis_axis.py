@@ -95,9 +95,6 @@ def update_axis(
     P[0, 2] -= k0 * g2
     P[1, 2] -= k1 * g2
     P[2, 2] -= k2 * g2
-    P[1, 0] = P[0, 1]
-    P[2, 0] = P[0, 2]
-    P[2, 1] = P[1, 2]
     if n > 3:
         k3 = g3 / S
         m[3] += k3 * nu
@@ -105,9 +102,24 @@ def update_axis(
         P[1, 3] -= k1 * g3
         P[2, 3] -= k2 * g3
         P[3, 3] -= k3 * g3
-        P[3, 0] = P[0, 3]
-        P[3, 1] = P[1, 3]
-        P[3, 2] = P[2, 3]
+    if not shifted:  # what was observed is known to its last digit: no difference of large numbers
+        left = r / S
+        if c == 0:
+            P[0, 0] = g0 * left
+            P[0, 1] = g1 * left
+            P[0, 2] = g2 * left
+            if n > 3:
+                P[0, 3] = g3 * left
+        else:
+            P[0, 1] = g0 * left
+            P[1, 1] = g1 * left
+            P[1, 2] = g2 * left
+            if n > 3:
+                P[1, 3] = g3 * left
+    for i in range(n):
+        P[i, i] = max(P[i, i], 0.0)
+        for j in range(i):
+            P[i, j] = P[j, i]
 
 
 @helper

@@ -47,9 +47,9 @@ class CleanOptions:
         Seconds of future in the lagged mode; default 20 intervals between fixes.
     recovery_s
         Seconds of unbroken rejection after which a track believes its sensor again; default 30
-        intervals between fixes, 40 with several hypotheses. No method locks out for longer. With
-        several hypotheses it is the longest run of wrong fixes that is survived; with a loss runs
-        may be followed sooner, where only fixes support the track.
+        intervals between fixes; no loss locks out for longer. Runs of errors may be followed
+        sooner where only fixes support the track. With several hypotheses it is the longest run of
+        wrong fixes that is survived, default 39.5 intervals.
     sigma_position, sigma_height, sigma_velocity
         Noise of the fixes: horizontal m, vertical m, velocity m/s.
     sensor_sigma
