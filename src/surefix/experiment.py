@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
+from surefix.errors import OptionsError
 from surefix.types import FloatArray
 
-__all__ = ["Experiment", "Figure", "Panel", "Progress", "Table", "Trace", "gather"]
+__all__ = ["Experiment", "Figure", "Panel", "Progress", "Table", "Trace", "check_least", "gather"]
 
 Progress = Callable[[int], None]
 """Told the number of finished runs."""
@@ -182,6 +183,28 @@ class Experiment:
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
     findings: tuple[str, ...] = ()
+
+
+def check_least(options: object, **least: float) -> None:
+    """Check that fields of options are not too small.
+
+    Parameters
+    ----------
+    options
+        A record.
+    least
+        The least value of each field; a whole number where the field is one.
+
+    Raises
+    ------
+    OptionsError
+        A field is smaller, or NaN.
+    """
+    for name, value in least.items():
+        given = getattr(options, name)
+        if not given >= value:
+            kind = "a whole number" if isinstance(value, int) else "a number"
+            raise OptionsError(f"{name} {given}", f"{kind} from {value}")
 
 
 def gather(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from surefix.errors import OptionsError
+from surefix.experiment import check_least
 from surefix.pipelines.options import CleanOptions, Mode
 from surefix.simulate.contamination import SCENARIOS, World, draw_world
 
@@ -61,9 +62,7 @@ class CompareOptions:
         for method in self.methods:
             for mode in self.modes:
                 CleanOptions(method=method, mode=mode)
-        for name, least in (("seed", 0), ("runs", 1), ("epochs", 200), ("jobs", 1)):
-            if getattr(self, name) < least:
-                raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {least}")
+        check_least(self, seed=0, runs=1, epochs=200, jobs=1)
 
     @property
     def trials(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surefix.errors import OptionsError
+from surefix.experiment import check_least
 from surefix.papers.cooperative_late import Channel
 from surefix.robust.loss import Loss, loss_named
 from surefix.simulate.cooperative import Formation
@@ -49,8 +50,7 @@ class CooperativeOptions:
     disorder_s: float = 4.0
 
     def __post_init__(self) -> None:
-        if self.runs < 1 or self.seed < 0:
-            raise OptionsError(f"seed {self.seed}, runs {self.runs}", "seed from 0, runs from 1")
+        check_least(self, seed=0, runs=1)
         for name in ("process", "process_raised", "process_2", "variance", "variance_2"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise OptionsError(f"{name} = {getattr(self, name)}", "a positive variance")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.errors import OptionsError
-from surefix.experiment import Experiment, Progress, Table
+from surefix.experiment import Experiment, Progress, Table, check_least
 from surefix.papers.radar_breakdown import BOUND, MILD
 from surefix.papers.radar_figures import figures
 from surefix.papers.radar_methods import (
@@ -77,10 +77,7 @@ class RadarOptions:
     trials: int = 5
 
     def __post_init__(self) -> None:
-        least = (("seed", 0), ("runs", 1), ("samples", 2_000), ("window", 10), ("trials", 1))
-        for name, value in (*least, ("burst", 1)):
-            if getattr(self, name) < value:
-                raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {value}")
+        check_least(self, seed=0, runs=1, samples=2_000, window=10, trials=1, burst=1)
         if self.window > 200 or self.burst > 200:
             raise OptionsError(f"window {self.window}, burst {self.burst}", "at most 200 samples")
         if not 0.0 < self.density < np.inf:

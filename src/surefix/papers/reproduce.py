@@ -48,10 +48,6 @@ def reproduce(
     InputError, ParseError
         A log cannot be read.
     """
-    if seed < 0:
-        raise OptionsError(f"seed {seed}", "a whole number from 0")
-    if runs < 1:
-        raise OptionsError(f"runs {runs}", "a whole number from 1")
     if logs and paper != "ship":
         raise OptionsError(f"logs for the paper {paper!r}", "no logs, or the paper ship")
     match paper:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surefix.errors import OptionsError
-from surefix.experiment import Experiment, Figure, Progress, Table, gather
+from surefix.experiment import Experiment, Figure, Progress, Table, check_least, gather
 from surefix.papers.ship_ends import end_rows
 from surefix.papers.ship_figures import figures
 from surefix.papers.ship_methods import DELAYS, OURS, PAPER
@@ -63,9 +62,7 @@ class ShipPaperOptions:
     hours: float = 11.0
 
     def __post_init__(self) -> None:
-        for name, least in (("seed", 0), ("runs", 1), ("hours", 0.5)):
-            if not getattr(self, name) >= least:
-                raise OptionsError(f"{name} {getattr(self, name)}", f"a number from {least}")
+        check_least(self, seed=0, runs=1, hours=0.5)
 
 
 def run(options: ShipPaperOptions, progress: Progress | None = None) -> Experiment:

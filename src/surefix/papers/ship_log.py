@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from surefix.errors import InputError, OptionsError
-from surefix.experiment import Experiment, Figure, Panel, Progress, Table, gather
+from surefix.experiment import Experiment, Figure, Panel, Progress, Table, check_least, gather
 from surefix.papers.ship_figures import thinned
 from surefix.papers.ship_log_rows import EDITORS, LENGTHS, agreement, edited, seeded, unit_of
 from surefix.papers.ship_methods import METHODS, OURS, PAPER, Series
@@ -67,9 +67,7 @@ class ShipLogOptions:
     def __post_init__(self) -> None:
         if not self.paths:
             raise OptionsError("no log", "one or more")
-        for name, least in (("seed", 0), ("runs", 1)):
-            if getattr(self, name) < least:
-                raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {least}")
+        check_least(self, seed=0, runs=1)
 
 
 def run_logs(options: ShipLogOptions, progress: Progress | None = None) -> Experiment:

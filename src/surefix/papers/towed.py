@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from surefix.errors import OptionsError
-from surefix.experiment import Experiment, Progress, Table, gather
+from surefix.experiment import Experiment, Progress, Table, check_least, gather
 from surefix.metrics import mean_bounds
 from surefix.models.towed import STATES, towed_model
 from surefix.papers.towed_figures import figures
@@ -78,10 +77,8 @@ class TowedOptions:
     gust_mps: float = 1.0
 
     def __post_init__(self) -> None:
-        """Validate once."""
+        check_least(self, seed=0, runs=1)
         for name, low, high in (
-            ("seed", 0, math.inf),
-            ("runs", 1, math.inf),
             ("minutes", 9.0, 1e4),
             ("interval_s", 0.2, 30.0),
             ("latitude_deg", -89.5, 89.5),

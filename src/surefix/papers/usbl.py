@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surefix.errors import OptionsError
-from surefix.experiment import Experiment, Progress, Table
+from surefix.experiment import Experiment, Progress, Table, check_least
 from surefix.papers.usbl_figures import figures
 from surefix.papers.usbl_methods import Reading, compare
 from surefix.papers.usbl_tables import FIRST, PRINTED_PCT, figures_of_run, tables
@@ -47,9 +46,7 @@ class UsblOptions:
     epochs: int = 700
 
     def __post_init__(self) -> None:
-        for name, least in (("seed", 0), ("runs", 1), ("epochs", 150)):
-            if getattr(self, name) < least:
-                raise OptionsError(f"{name} {getattr(self, name)}", f"a whole number from {least}")
+        check_least(self, seed=0, runs=1, epochs=150)
 
 
 def run(options: UsblOptions, progress: Progress | None = None) -> Experiment:

@@ -130,6 +130,7 @@ def verdicts(
 
     The weight is the smallest of the position groups that were observed. A fix is rejected where
     its horizontal position (or its only group) is; a height rejected alone leaves it down-weighted.
+    Where each axis is judged by itself, so does one horizontal axis alone.
 
     Parameters
     ----------
@@ -150,11 +151,7 @@ def verdicts(
     smallest = _fold(np.fmin, weight)
     verdict = np.full(n, int(Verdict.USED))
     verdict[smallest < _WHOLE] = Verdict.DOWNWEIGHTED
-    leading = weight[:, 0].copy()
-    for g in range(1, groups):
-        beside = apart and axes[g] < 2
-        best = np.fmax(leading, weight[:, g]) if beside else leading
-        leading = np.where(np.isnan(best), weight[:, g], best)
+    leading = _leading(weight, axes, apart)
     verdict[leading < _DOUBTFUL if several else leading <= _NONE] = Verdict.REJECTED
     reason = np.full(n, int(Reason.AGREES))
     reason[verdict != Verdict.USED] = Reason.OFF
@@ -164,9 +161,8 @@ def verdicts(
         part = low.any(axis=1) & ~low.all(axis=1) & (np.isfinite(weight).sum(axis=1) > 1)
         reason[part] = Reason.AXIS_OFF
         detail[part] = (low[part] * _bits(axes, apart)).sum(axis=1)
-    if several:
-        run = (found.run > 0) & (verdict == Verdict.REJECTED)
-        reason[run], detail[run] = Reason.RUN, found.run[run]
+    run = (found.run > 0) & (verdict == Verdict.REJECTED)
+    reason[run], detail[run] = Reason.RUN, found.run[run]
     since = found.since[:, :groups]
     jumped = np.isfinite(since).any(axis=1)
     reason[jumped & (verdict != Verdict.REJECTED)] = Reason.JUMP
@@ -184,6 +180,16 @@ def verdicts(
         reason.astype(np.int64),
         detail,
     )
+
+
+def _leading(weight: FloatArray, axes: tuple[int, ...], apart: bool) -> FloatArray:
+    """Weight that a fix as a whole is judged by: the horizontal one, or the only one there is."""
+    leading = weight[:, 0].copy()
+    for g in range(1, weight.shape[1]):
+        beside = apart and axes[g] < 2
+        best = np.fmax(leading, weight[:, g]) if beside else leading
+        leading = np.where(np.isnan(best), weight[:, g], best)
+    return leading
 
 
 def _bits(axes: tuple[int, ...], apart: bool) -> IntArray:
