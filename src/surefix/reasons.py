@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from surefix.types import Reason, Verdict, Verdicts
 
-__all__ = ["CALENDAR_FROM", "clock", "texts"]
+__all__ = ["CALENDAR_FROM", "clock", "texts", "vector"]
 
 CALENDAR_FROM = 1e8
 """s: smaller times count from the start of a log and carry no date."""
@@ -45,16 +46,31 @@ def _where(mask: int) -> str:
     return " and ".join([*named, *(["vertically"] if mask & 4 else [])])
 
 
-def _text(reason: int, verdict: int, weight: float, sigma: float, detail: float) -> str:
+def vector(offset: Sequence[float]) -> str:
+    """An offset in the axes that have one; metres, if it has several."""
+    known = [f"{value:.1f}".replace("-", "−") for value in offset if math.isfinite(value)]
+    return f"({', '.join(known)}) m" if len(offset) > 1 else known[0] if known else "unknown"
+
+
+def _text(
+    reason: int,
+    verdict: int,
+    weight: float,
+    sigma: float,
+    detail: float,
+    offset: Sequence[float],
+) -> str:
     match reason:
         case Reason.OFF if verdict == Verdict.REJECTED:
             return f"{sigma:.1f} σ off"
         case Reason.OFF:
             return f"{sigma:.1f} σ off, weight {weight:.2f}"
+        case Reason.ISOLATED:
+            return f"isolated error, {sigma:.1f} σ off"
         case Reason.AXIS_OFF:
             return f"{sigma:.1f} σ off {_where(int(detail))}, the rest used"
         case Reason.RUN:
-            return f"in a run of {int(detail)} that are wrong together, {sigma:.1f} σ off"
+            return f"in a run of {int(detail)} with offset {vector(offset)}, {sigma:.1f} σ off"
         case Reason.JUMP:
             return f"jump accepted, dated back to {clock(detail)}"
         case Reason.REPEATED:
@@ -77,6 +93,7 @@ def texts(verdicts: Verdicts) -> list[str]:
             verdicts.weight.tolist(),
             verdicts.innovation_sigma.tolist(),
             verdicts.detail.tolist(),
+            verdicts.offset.tolist(),
             strict=True,
         )
     ]

@@ -200,6 +200,7 @@ class Reason(IntEnum):
     ACCEPTED_BY_USER = 11
     REJECTED_BY_USER = 12
     RUN = 13
+    ISOLATED = 14
 
 
 class Verdicts(NamedTuple):
@@ -222,6 +223,8 @@ class Verdicts(NamedTuple):
     detail
         (n,) the figure that goes with the reason: a time in s (JUMP, HELD, LATE: the time it refers
         to), an axis mask (AXIS_OFF: bits 0, 1, 2 for x, y, z) or a number of fixes (RUN).
+    offset
+        (n, 3) m, the common offset of the run that the observation belongs to; NaN outside of runs.
     """
 
     verdict: IntArray
@@ -230,6 +233,7 @@ class Verdicts(NamedTuple):
     standardised: FloatArray
     reason: IntArray
     detail: FloatArray
+    offset: FloatArray
 
 
 class Track(NamedTuple):

@@ -111,8 +111,12 @@ def _verdict(reason):
     detail = 1.0 if reason == Reason.AXIS_OFF else 300.0
     if reason in (Reason.JUMP, Reason.HELD, Reason.LATE, Reason.REPEATED):
         detail = 1715673602.0
-    verdict = Verdict.REJECTED if reason == Reason.OFF else Verdict.DOWNWEIGHTED
-    one = [verdict, 0.5, 6.1, float("nan"), reason, detail]
+    verdict = (
+        Verdict.REJECTED
+        if reason in (Reason.OFF, Reason.ISOLATED, Reason.RUN)
+        else Verdict.DOWNWEIGHTED
+    )
+    one = [verdict, 0.5, 6.1, float("nan"), reason, detail, [4.1, -7.0, float("nan")]]
     return Verdicts(*(np.array([value]) for value in one))
 
 

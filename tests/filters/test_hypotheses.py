@@ -102,6 +102,7 @@ CASES = {
     "acceleration": ({"axes": 1, "order": 3, "run": (2, 3)}, 5),
     "missing": ({"axes": 2, "velocity": 0.3, "missing": 0.3}, 5),
     "three axes": ({"axes": 3}, 4),
+    "lost": ({"axes": 2, "run": range(2, 4)}, 6),
     "an angle": ({"axes": 1, "period": 60.0, "run": (2, 3)}, 6),
 }
 SAID = {
@@ -109,6 +110,7 @@ SAID = {
     "a jump of two sensors": {"commit"},
     "aided": {"moves", "slips", "poor"},
     "three axes": {"offx", "offy", "offz", "offxy"},
+    "lost": {"anew"},
 }
 
 
@@ -120,8 +122,8 @@ def test_it_is_the_enumeration(name):
     for seed in range(6):
         motion, epochs = series(seed, n, **how)
         prior = prior_of(motion.axes)
-        if name == "a jump of two sensors":
-            prior = prior._replace(longest=100.0)
+        longest = {"a jump of two sensors": 100.0, "lost": 1.5}.get(name, prior.longest)
+        prior = prior._replace(longest=longest)
         said |= agrees(motion, prior, epochs, prior._replace(isolated=1e-9, partial=1e-9))
     assert said >= SAID.get(name, set())
 

@@ -11,12 +11,13 @@ from surefix.filters.hypotheses import (
     OPEN,
     POOR,
     POOR_WEIGHT,
+    RESTART,
     VELOCITY_OUT,
     VELOCITY_POOR,
     Trail,
 )
 from surefix.filters.hypothesis_review import deleted_residuals, review
-from surefix.filters.hypothesis_trail import decide, follow, run_lengths, undecided
+from surefix.filters.hypothesis_trail import decide, follow, runs, undecided
 from surefix.filters.learning import supposed
 from surefix.filters.records import Recovery
 from surefix.filters.rts import smooth
@@ -37,9 +38,14 @@ def trail_of(*codes):
     return Trail(parent, code, best)
 
 
+def every(codes):
+    """Both axes observed each time."""
+    return np.ones((len(codes), 2), np.bool_)
+
+
 def decided(*codes, first=0):
     said = undecided(MOTION, len(codes))
-    decide(MOTION, trail_of(*codes), len(codes) - 1, first, said)
+    decide(MOTION, every(codes), trail_of(*codes), len(codes) - 1, first, said)
     return said
 
 
@@ -85,15 +91,15 @@ def test_a_jump_after_a_run_that_was_wrong():
 def test_a_jump_beyond_the_window_is_put_at_its_edge_once():
     codes = (0, OPEN, CONTINUE, CONTINUE, CONTINUE | COMMIT, 0)
     said = undecided(MOTION, 6)
-    decide(MOTION, trail_of(*codes), 3, 0, said)
+    decide(MOTION, every(codes), trail_of(*codes), 3, 0, said)
     assert said.run.tolist() == [0, 1, 1, 1, 0, 0]
-    changed = decide(MOTION, trail_of(*codes), 4, 3, said)
+    changed = decide(MOTION, every(codes), trail_of(*codes), 4, 3, said)
     assert changed == 3
     assert said.jump.tolist() == [0, 0, 0, 3, 0, 0]
     assert said.run.tolist() == [0, 1, 1, 0, 0, 0]
-    assert decide(MOTION, trail_of(*codes), 5, 3, said) == 5  # nothing new
+    assert decide(MOTION, every(codes), trail_of(*codes), 5, 3, said) == 5  # nothing new
     assert said.jump.tolist() == [0, 0, 0, 3, 0, 0]
-    decide(MOTION, trail_of(*codes), 5, 4, said)
+    decide(MOTION, every(codes), trail_of(*codes), 5, 4, said)
     assert said.jump.tolist() == [0, 0, 0, 3, 0, 0]
 
 
@@ -108,12 +114,34 @@ def test_it_follows_until_the_past_is_seen_otherwise():
     assert follow(MOTION, trail, 0, 0, said) == 2
 
 
-def test_run_lengths():
+def test_runs_are_counted_and_numbered():
     used = np.array([1, 0, 0, 0, np.nan, 0, 1, 0, 0, 1, 1, 0], float)[:, None]
     run = np.array([0, 1, 1, 0, 0, 1, 0, 1, 1, 0, 0, 1])
     #                        isolated, missing
-    assert run_lengths(run, used).tolist() == [0, 3, 3, 0, 0, 3, 0, 2, 2, 0, 0, 1]
-    assert len(run_lengths(run[:0], used[:0])) == 0
+    length, number = runs(run, used)
+    assert length.tolist() == [0, 3, 3, 0, 0, 3, 0, 2, 2, 0, 0, 1]
+    assert number.tolist() == [-1, 0, 0, -1, -1, 0, -1, 1, 1, -1, -1, 2]
+    assert len(runs(run[:0], used[:0])[0]) == 0
+
+
+ANEW = 3 * RESTART
+
+
+def test_a_track_that_began_anew_did_so_with_the_first_fix_left_out():
+    """Where it is and how fast; in a window that begins later, at the fix itself."""
+    codes = 0, 3, 0, 3, 1, 3, OPEN, 3, ANEW, 0
+    said = decided(*codes)
+    assert said.jump.tolist() == [0, 0, 0, 5, 0, 10, 0, 0, 0, 0]  # y is used once more
+    said = decided(*codes, first=5)
+    assert said.jump.tolist() == [0, 0, 0, 0, 0, 0, 0, 0, 15, 0]
+
+
+def test_what_is_not_observed_is_not_used_either():
+    seen = np.ones((6, 2), np.bool_)
+    seen[3] = False
+    said = undecided(MOTION, 6)
+    decide(MOTION, seen, trail_of(0, 3, 3, 0, 3, ANEW), 5, 0, said)
+    assert said.jump.tolist() == [0, 15, 0, 0, 0, 0]
 
 
 def fitted(made, fixed):

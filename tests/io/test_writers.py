@@ -45,7 +45,9 @@ def verdicts(n: int) -> Verdicts:
     sigma = np.full(n, 0.5)
     reason[1::3], verdict[1::3], sigma[1::3] = Reason.OFF, Verdict.REJECTED, 9.25
     reason[2::3], verdict[2::3] = Reason.OFF, Verdict.DOWNWEIGHTED
-    return Verdicts(verdict, np.ones(n), sigma, np.zeros((n, 3)), reason, np.zeros(n))
+    return Verdicts(
+        verdict, np.ones(n), sigma, np.zeros((n, 3)), reason, np.zeros(n), np.full((n, 3), 2.0)
+    )
 
 
 def put(writer: TrackWriter, n: int, start: int = 0, **lon: float) -> None:

@@ -73,14 +73,14 @@ def test_a_run_is_named_and_counted(cleaned):
     else:
         assert named.all()
         assert (verdicts.detail[RUN] == len(RUN)).all()
-        assert said[160].startswith("in a run of 25 that are wrong together, ")
+        assert said[160].startswith("in a run of 25 with offset (")
         assert said[160].endswith(" σ off")
 
 
 def test_the_axis_that_is_wrong_is_named(cleaned):
     _, found, said = cleaned
     for row in ONE:
-        assert found.verdicts.verdict[row] == Verdict.DOWNWEIGHTED
+        assert found.verdicts.verdict[row] == Verdict.REJECTED
         assert found.verdicts.reason[row] == Reason.AXIS_OFF
         assert found.verdicts.detail[row] == 1
         assert said[row].endswith("along x, the rest used")

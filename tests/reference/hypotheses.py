@@ -19,6 +19,9 @@ GROSS = 36.0
 CONFIRMED = 3
 PREFERS = 3.0
 ALIKE = 0.7
+PATIENCE = 1.25
+ANEW = 0.1
+HASTE = 2.0
 
 
 class Account(NamedTuple):
@@ -26,7 +29,8 @@ class Account(NamedTuple):
 
     Per axis: ``rows`` the used observations (step, component, offsets, value, variance),
     ``offsets`` how many there are, ``lasting`` those that became jumps, ``open`` that of the run.
-    ``said`` is a word or two per epoch.
+    ``lost`` is when fixes began to be left out and how many were; ``rate`` what a velocity had been
+    before anything was seen. ``said`` is a word or two per epoch.
     """
 
     weight: float
@@ -41,6 +45,8 @@ class Account(NamedTuple):
     length: int = 0
     faulty: frozenset = frozenset()
     slip: tuple = ()
+    lost: tuple = ()
+    rate: tuple = ()
     said: tuple = ()
 
 
@@ -75,6 +81,7 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
     """
     d, none = motion.axes, ((),) * motion.axes
     empty = Account(0.0, none, (0,) * d, none, (None,) * d, (False,) * d, slip=(0.0,) * d)
+    empty = empty._replace(lost=((np.nan, 0),) * d, rate=((0, prior.sigma_velocity),) * d)
     accounts, out, steps = [empty], [], []
     later = prior
     for k, time in enumerate(epochs.time):
@@ -144,11 +151,14 @@ def _joint(motion, prior, steps, account, a):
     n, count = motion.order, len(steps)
     size = n * count + account.offsets[a]
     information, vector = np.zeros((size, size)), np.zeros(size)
-    first = np.arange(1, n)
-    information[first, first] = 1.0 / prior.sigma_velocity**2
+    begun, speed = account.rate[a]
+    first = n * begun + np.arange(1, n)
+    information[first, first] = 1.0 / speed**2
     if not account.seen[a]:
-        information[0, 0] = 1.0  # anything: nothing that is asked for depends on it
-    for k in range(1, count):
+        information[n * begun, n * begun] = 1.0  # anything: nothing that is asked for depends on it
+    before = np.arange(n * begun)
+    information[before, before] = 1.0  # likewise, of what was before the track began anew
+    for k in range(begun + 1, count):
         dt = steps[k] - steps[k - 1]
         G = noise_factor(NAMES[n], 1, dt, motion.density[a])
         rows = np.hstack([-transition(NAMES[n], 1, dt), np.eye(n)])
@@ -218,8 +228,12 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, step):
 
 
 def _use(account, z, variance, time, step, axes, period, known, *, running=False):
-    """Take the positions of some axes into the account."""
-    rows, seen = account.rows, account.seen
+    """Take the positions of some axes into the account; the others are left out."""
+    rows, seen, lost = account.rows, account.seen, account.lost
+    for a in np.flatnonzero(~np.isnan(z[: len(seen)])):
+        since, count = lost[a]
+        out = running or a not in axes
+        lost = _set(lost, a, (since if count else time, count + 1) if out else (np.nan, 0))
     for a in axes:
         offsets = account.lasting[a]
         if running and account.open[a] is not None:
@@ -231,7 +245,8 @@ def _use(account, z, variance, time, step, axes, period, known, *, running=False
         rows = _set(rows, a, (*rows[a], (step, 0, offsets, value, variance[a])))
         seen = _set(seen, a, True)
     new = any(seen) and np.isnan(account.began)
-    return account._replace(rows=rows, seen=seen, began=time if new else account.began)
+    began = time if new else account.began
+    return account._replace(rows=rows, seen=seen, lost=lost, began=began)
 
 
 def _position(motion, prior, account, known, z, r, time, sensor, step):
@@ -241,8 +256,8 @@ def _position(motion, prior, account, known, z, r, time, sensor, step):
     for a in axes:
         m, P = known[a]
         if not account.seen[a]:
-            inside[a] = -np.log(2.0 * np.pi * prior.spread[a])
-            square[a], wide[a] = 1.0, prior.spread[a] ** 2
+            square[a], wide[a] = 1.0, prior.spread[a] ** 2 + r[a]
+            inside[a] = cauchy(np.ones(1), np.array([wide[a]]))
             continue
         nu, S = _wrap(z[a] - m[0], period), P[0, 0] + r[a]
         inside[a] = normal(nu, S)
@@ -263,7 +278,7 @@ def _position(motion, prior, account, known, z, r, time, sensor, step):
         return _use(base, z, variance, time, step, some, period, known, **how)
 
     over = {"run": -1, "open": (None,) * d}
-    out = [_told(account, wild(axes) + np.log(prior.isolated), "isolated")]
+    out = [_told(used(account, []), wild(axes) + np.log(prior.isolated), "isolated")]
     if own:
         ended = used(account._replace(**over), axes)
         out.append(_told(ended, belongs + np.log(prior.ending), "drop"))
@@ -293,7 +308,33 @@ def _position(motion, prior, account, known, z, r, time, sensor, step):
         known = [(np.append(m[:-1], 0.0), P) for m, P in known]
         begun = _use(begun, z, r, time, step, axes, period, known, running=True)
         out.append(_told(begun, wild(axes) + np.log(prior.burst), "open"))
+    due = [a for a in axes if account.seen[a] and _due(prior, account.lost[a], time)]
+    if due and (due == axes or not own):
+        fresh = account
+        for a in due:
+            far = abs(_wrap(z[a] - known[a][0][0], period)) / (time - account.lost[a][0])
+            fresh = _forgotten(fresh, a, step, max(prior.sigma_velocity, HASTE * far))
+        gain = np.log(ANEW) + sum(inside[a] for a in axes if a not in due)
+        gain += sum(cauchy(np.ones(1), np.array([prior.spread[a] ** 2 + r[a]])) for a in due)
+        fresh = used(fresh._replace(**over, began=time), axes)
+        out.append(_told(fresh, gain, "anew"))
     return out
+
+
+def _due(prior, lost, time):
+    """Whether an axis has been left out for so long that its track may begin anew."""
+    return lost[1] >= CONFIRMED and time - lost[0] >= PATIENCE * prior.longest
+
+
+def _forgotten(account, a, step, speed):
+    """Nothing is known of an axis but that its rates are about nought."""
+    return account._replace(
+        rows=_set(account.rows, a, ()),
+        offsets=_set(account.offsets, a, 0),
+        lasting=_set(account.lasting, a, ()),
+        seen=_set(account.seen, a, False),
+        rate=_set(account.rate, a, (step, speed)),
+    )
 
 
 def _partial(prior, account, axes, inside, wild, used):
@@ -315,7 +356,8 @@ def _jumped(account):
     pairs = zip(account.lasting, account.open, strict=True)
     lasting = tuple(old if new is None else (*old, new) for old, new in pairs)
     nothing = (None,) * len(lasting)
-    return account._replace(lasting=lasting, open=nothing, run=-1, began=account.opened)
+    found = ((np.nan, 0),) * len(lasting)
+    return account._replace(lasting=lasting, open=nothing, run=-1, began=account.opened, lost=found)
 
 
 def _lasting(prior, account, time):

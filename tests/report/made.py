@@ -41,6 +41,7 @@ def judged(standardised: FloatArray) -> Verdicts:
         standardised=standardised,
         reason=reason.astype(np.int64),
         detail=np.full(size.size, np.nan),
+        offset=np.full((size.size, 3), np.nan),
     )
 
 

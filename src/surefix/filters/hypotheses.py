@@ -19,6 +19,7 @@ __all__ = [
     "OPEN",
     "POOR",
     "POOR_WEIGHT",
+    "RESTART",
     "VELOCITY_OUT",
     "VELOCITY_POOR",
     "Bank",
@@ -44,6 +45,8 @@ VELOCITY_OUT: Final = 128
 POOR: Final = 256
 VELOCITY_POOR: Final = 512
 DENY: Final = 1024
+RESTART: Final = 2048
+"""Bits 11 … 13: the axes whose track begins anew with this fix."""
 
 POOR_WEIGHT: Final = 0.25
 """Weight of an observation that belongs to the track but is twice as noisy as usual."""
@@ -117,6 +120,8 @@ class Bank(NamedTuple):
         (k,) bit mask of the sensors whose last velocity was wrong.
     slip
         (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
+    lost, missed
+        (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -133,6 +138,8 @@ class Bank(NamedTuple):
     length: IntArray
     faulty: IntArray
     slip: FloatArray
+    lost: FloatArray
+    missed: IntArray
     announced: FloatArray
 
 
@@ -161,6 +168,8 @@ class Found(NamedTuple):
         (n,) fixes so far of the run that the epoch's fix belongs to, 0 if to none.
     since
         (n,) s, where the likeliest hypothesis just took a run for a true jump: when that began.
+    offset
+        (n, axes) offset of the run that the epoch's fix belongs to; NaN if to none.
     """
 
     mean: FloatArray
@@ -170,6 +179,7 @@ class Found(NamedTuple):
     evidence: FloatArray
     run: IntArray
     since: FloatArray
+    offset: FloatArray
 
 
 def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
@@ -188,5 +198,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros(most, np.int64),
         np.zeros(most, np.int64),
         np.zeros((most, d)),
+        np.full((most, d), np.nan),
+        np.zeros((most, d), np.int64),
         np.full(1, np.nan),
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from surefix.jit import helper
 from surefix.types import FloatArray
 
-__all__ = ["commit", "forget", "open_run", "predict_axis", "update_axis"]
+__all__ = ["begin_anew", "commit", "forget", "open_run", "predict_axis", "update_axis"]
 
 
 @helper
@@ -120,6 +120,19 @@ def update_axis(
         P[i, i] = max(P[i, i], 0.0)
         for j in range(i):
             P[i, j] = P[j, i]
+
+
+@helper
+def begin_anew(m: FloatArray, P: FloatArray, n: int, speed: float) -> None:
+    """Forget how fast the vehicle goes: its rates are 0 ± ``speed``, and where it is stays."""
+    for i in range(n):
+        for j in range(n):
+            if i > 0 or j > 0:
+                P[i, j] = 0.0
+        if 0 < i < n - 1:
+            P[i, i] = speed * speed
+        if i > 0:
+            m[i] = 0.0
 
 
 @helper

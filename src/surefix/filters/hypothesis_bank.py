@@ -14,10 +14,11 @@ from surefix.filters.hypotheses import (
     OPEN,
     POOR,
     POOR_WEIGHT,
+    RESTART,
     Bank,
     Found,
 )
-from surefix.filters.hypothesis_axis import commit, forget, open_run, update_axis
+from surefix.filters.hypothesis_axis import begin_anew, commit, forget, open_run, update_axis
 from surefix.filters.hypothesis_branches import wrapped
 from surefix.filters.records import Motion
 from surefix.jit import helper
@@ -26,6 +27,8 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["apply_position", "best_of", "copy_hypothesis", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
+_HASTE = 2.0  # a track that begins anew may be so much faster than it went away
+_ANEW = 7 * RESTART
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
 
@@ -39,6 +42,8 @@ def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> N
                 to.covariance[i, a, j, l] = source.covariance[k, a, j, l]
         to.seen[i, a] = source.seen[k, a]
         to.slip[i, a] = source.slip[k, a]
+        to.lost[i, a] = source.lost[k, a]
+        to.missed[i, a] = source.missed[k, a]
     to.began[i] = source.began[k]
     to.run[i] = source.run[k]
     to.opened[i] = source.opened[k]
@@ -105,33 +110,49 @@ def apply_position(
     code: int,
     time: float,
     sensor: int,
+    speed: float,
 ) -> None:
-    """Do to hypothesis k what its candidate said."""
+    """Do to hypothesis k what its candidate said; ``speed`` is that of a vehicle unknown."""
     n = motion.order + 1
     b = n - 1
+    running = code & (OPEN | CONTINUE) != 0
     if code & OPEN:
         bank.run[k] = sensor
         bank.opened[k] = time
         bank.length[k] = 1
     elif code & CONTINUE:
         bank.length[k] += 1
-    elif code & DROP:
+    elif code & (DROP | _ANEW):
         bank.run[k] = -1
     elif code & COMMIT:
         bank.run[k] = -1
         bank.began[k] = bank.opened[k]
+        bank.missed[k] = 0
     elif code & DENY:
         bank.opened[k] = time
     for a in range(motion.axes):
         m = bank.mean[k, a]
         P = bank.covariance[k, a]
-        if code & DROP:
+        if code & (DROP | _ANEW):
             forget(m, P, n)
         elif code & COMMIT:
             commit(m, P, n)
         elif code & OPEN:
             forget(m, P, n)
-        if math.isnan(z[a]) or (code >> a) & 1:
+        if math.isnan(z[a]):
+            continue
+        if code & (RESTART << a):
+            far = abs(wrapped(z[a] - m[0], motion.period)) / (time - bank.lost[k, a])
+            begin_anew(m, P, n, max(speed, _HASTE * far))
+            bank.seen[k, a] = False
+            bank.began[k] = time
+        if running or (code >> a) & 1:
+            if bank.missed[k, a] == 0:
+                bank.lost[k, a] = time
+            bank.missed[k, a] += 1
+        else:
+            bank.missed[k, a] = 0
+        if (code >> a) & 1:
             continue
         if not bank.seen[k, a]:
             bank.seen[k, a] = True

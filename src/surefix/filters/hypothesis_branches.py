@@ -14,6 +14,7 @@ from surefix.filters.hypotheses import (
     OPEN,
     POOR,
     POOR_WEIGHT,
+    RESTART,
     VELOCITY_OUT,
     VELOCITY_POOR,
     Bank,
@@ -33,7 +34,7 @@ __all__ = [
     "wrapped",
 ]
 
-BRANCHES = 12
+BRANCHES = 13
 """Candidates that a hypothesis can have at one epoch, at most."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
@@ -41,6 +42,8 @@ _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
+_PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew
+_ANEW = 0.1  # … and how probable that is then
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -75,6 +78,12 @@ def wrapped(nu: float, period: float) -> float:
 def log_normal(nu: float, S: float) -> float:
     """Log-density of an innovation ν of variance S."""
     return -0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
+
+
+@helper
+def _anywhere(square: float) -> float:
+    """Log-density of a first fix: that of a gross error of the usual size."""
+    return log_wild(1.0, 0.5 * math.log(square), 1)
 
 
 @helper
@@ -145,12 +154,13 @@ def position_branches(
     z: FloatArray,
     variance: FloatArray,
     forced: FloatArray,
+    time: float,
     sensor: int,
     score: FloatArray,
     parent: IntArray,
     code: IntArray,
 ) -> int:
-    """Candidates of an observed position."""
+    """Candidates of an observed position at ``time``."""
     d, n = motion.axes, motion.order + 1
     b = n - 1
     inside = np.empty(3)
@@ -182,8 +192,8 @@ def position_branches(
                 continue
             s2 = prior.spread[a] * prior.spread[a]
             if not bank.seen[k, a]:
-                inside[a] = -math.log(2.0 * _PI * prior.spread[a])
-                wild[a], wide[a] = 1.0, s2
+                wild[a], wide[a] = 1.0, s2 + variance[a]
+                inside[a] = _anywhere(wide[a])
                 unknown = True
             else:
                 nu = wrapped(z[a] - bank.mean[k, a, 0], motion.period)
@@ -258,4 +268,21 @@ def position_branches(
                 score[total] = base + inside[2] + both + math.log(prior.partial / (observed + 1))
                 parent[total], code[total] = k, 3
                 total += 1
+        anew = 0
+        every = True
+        fresh = math.log(_ANEW)
+        for a in range(d):
+            if math.isnan(z[a]):
+                continue
+            due = bank.seen[k, a] and bank.missed[k, a] >= CONFIRMED
+            if due and time - bank.lost[k, a] >= _PATIENCE * prior.longest:
+                anew |= RESTART << a
+                fresh += _anywhere(prior.spread[a] * prior.spread[a] + variance[a])
+            else:
+                every = False
+                fresh += inside[a]
+        if anew and (every or not own):
+            score[total] = base + fresh
+            parent[total], code[total] = k, anew
+            total += 1
     return total

@@ -12,15 +12,16 @@ from surefix.filters.hypotheses import (
     OPEN,
     POOR,
     POOR_WEIGHT,
+    RESTART,
     VELOCITY_OUT,
     VELOCITY_POOR,
     Trail,
 )
 from surefix.filters.records import Motion
 from surefix.jit import helper, kernel
-from surefix.types import FloatArray, IntArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["Decisions", "decide", "follow", "run_lengths", "undecided"]
+__all__ = ["Decisions", "decide", "follow", "runs", "undecided"]
 
 
 class Decisions(NamedTuple):
@@ -32,7 +33,8 @@ class Decisions(NamedTuple):
         (n, 2·axes) weight of the component: 1 where it belongs to the track, less where it is poor,
         0 where it does not.
     jump
-        (n,) bit mask of the axes whose position jumps before this epoch.
+        (n,) bit mask of the axes whose position jumps before this epoch, and above them of those
+        whose rate does.
     run
         (n,) 1 where the fix belongs to a run with a common offset.
     """
@@ -82,10 +84,19 @@ def _untold(decisions: Decisions, first: int) -> bool:
 
 
 @kernel
-def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decisions) -> int:
+def decide(
+    motion: Motion,
+    seen: BoolArray,
+    trail: Trail,
+    head: int,
+    first: int,
+    decisions: Decisions,
+) -> int:
     """Write what the likeliest hypothesis of epoch ``head`` says of the epochs from ``first`` on.
 
-    A jump that is dated back further than ``first`` is put there.
+    A jump that is dated back further than ``first`` is put there. A track that began anew did so at
+    the first fix that was left out, or, if that is before ``first``, at the one that it began with.
+    ``seen`` (n, axes) tells where positions were observed.
 
     Returns
     -------
@@ -96,8 +107,20 @@ def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decis
     committed = False
     changed = head
     every = (1 << motion.axes) - 1
+    both = 1 | 1 << motion.axes
+    anew = np.full(motion.axes, -1)  # the fix of a restart …
+    lost = np.full(motion.axes, -1)  # … and the earliest one left out before it
     for k in range(head, first - 1, -1):
         code = trail.code[k, slot]
+        for a in range(motion.axes):
+            if lost[a] < 0 or not seen[k, a]:
+                continue
+            if (code >> a) & 1 or code & (OPEN | CONTINUE):
+                lost[a] = k
+            else:
+                decisions.jump[lost[a]] |= both << a
+                changed = min(changed, lost[a])
+                lost[a] = -1
         if code & COMMIT:
             committed = True
         running = code & (OPEN | CONTINUE) != 0
@@ -116,13 +139,23 @@ def decide(motion: Motion, trail: Trail, head: int, first: int, decisions: Decis
         decisions.run[k] = 1 if inside else 0
         if code & OPEN:
             committed = False
+        for a in range(motion.axes):
+            if code & (RESTART << a):
+                anew[a] = lost[a] = k
         slot = trail.parent[k, slot]
+    for a in range(motion.axes):
+        if lost[a] >= 0:
+            at = anew[a] if first > 0 else lost[a]
+            decisions.jump[at] |= both << a
+            changed = min(changed, at)
     return changed
 
 
 @kernel
 def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisions) -> int:
     """Write decisions from ``head`` on as long as the likeliest hypothesis descends from ``slot``.
+
+    What dates something back ends it: a jump, or a track that began anew.
 
     Returns
     -------
@@ -133,7 +166,7 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
     for k in range(head, n):
         best = trail.best[k]
         code = trail.code[k, best]
-        if k > 0 and (trail.parent[k, best] != slot or code & COMMIT):
+        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | 7 * RESTART)):
             return k
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)
@@ -144,8 +177,8 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
 
 
 @kernel
-def run_lengths(run: IntArray, used: FloatArray) -> IntArray:
-    """Fixes of the run that each fix belongs to, 0 where to none.
+def runs(run: IntArray, used: FloatArray) -> tuple[IntArray, IntArray]:
+    """Count the fixes of the run that each fix belongs to, and number the runs.
 
     Parameters
     ----------
@@ -154,9 +187,16 @@ def run_lengths(run: IntArray, used: FloatArray) -> IntArray:
     used
         (n, m) 1 where a component of the position was used, 0 where not, NaN where not observed;
         a fix that was used ends a run.
+
+    Returns
+    -------
+    length, number
+        (n,) 0 and −1 where the fix belongs to none.
     """
     n = run.shape[0]
     length = np.zeros(n, np.int64)
+    number = np.full(n, -1)
+    found = 0
     first = last = -1
     count = 0
     for k in range(n + 1):
@@ -168,10 +208,12 @@ def run_lengths(run: IntArray, used: FloatArray) -> IntArray:
             for j in range(first, last + 1):
                 if run[j]:
                     length[j] = count
+                    number[j] = found
+            found += 1
             count = 0
         elif k < n and run[k]:
             if count == 0:
                 first = k
             last = k
             count += 1
-    return length
+    return length, number

@@ -43,6 +43,7 @@ def from_filtered(filtered: Filtered) -> Estimate:
         filtered.jump,
         filtered.since,
         np.zeros(len(filtered.jump), np.int64),
+        np.full((len(filtered.jump), filtered.standardised.shape[1] // 2), np.nan),
     )
 
 

@@ -29,7 +29,7 @@ from surefix.filters.hypotheses import (
     Prior,
     Trail,
 )
-from surefix.filters.hypothesis_axis import commit, predict_axis, update_axis
+from surefix.filters.hypothesis_axis import begin_anew, commit, predict_axis, update_axis
 from surefix.filters.hypothesis_bank import (
     apply_position,
     best_of,
@@ -46,6 +46,7 @@ from surefix.filters.hypothesis_branches import (
     wrapped,
 )
 from surefix.filters.records import Epochs, Motion
+from surefix.filters.track_step import VAGUE_RATE
 from surefix.jit import helper, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
@@ -88,9 +89,12 @@ def _apply_velocity(
 
 @helper
 def _displace(motion: Motion, bank: Bank, jump: int) -> None:
-    """Forget the positions that jump here by a decision made beforehand; the rates go on."""
+    """Forget the positions, or the rates, that jump here by a decision made beforehand."""
+    n = motion.order + 1
     for i in range(bank.number[0]):
         for a in range(motion.axes):
+            if (jump >> (motion.axes + a)) & 1:
+                begin_anew(bank.mean[i, a], bank.covariance[i, a], n, VAGUE_RATE)
             if (jump >> a) & 1:
                 bank.seen[i, a] = False
 
@@ -107,6 +111,7 @@ def _commit_lasting(motion: Motion, prior: Prior, bank: Bank, time: float, said:
                 commit(bank.mean[i, a], bank.covariance[i, a], motion.order + 1)
             bank.run[i] = -1
             bank.began[i] = bank.opened[i]
+            bank.missed[i] = 0
             said[i] |= COMMIT
 
 
@@ -146,6 +151,8 @@ def _judge(motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, out
     best = best_of(bank.weight, bank.number[0])
     if said[best] & (OPEN | CONTINUE) and not said[best] & COMMIT:
         out.run[k] = bank.length[best]
+        for a in range(d):
+            out.offset[k, a] = bank.mean[best, a, motion.order]
     began = bank.began[best]
     if not math.isnan(began):
         if began > bank.announced[0] + 0.5 * prior.longest:
@@ -207,7 +214,7 @@ def _run(
                 )
             elif stage == 1 and placed:
                 total = position_branches(
-                    motion, prior, one, z, r, forced, sensor, score, parent, code
+                    motion, prior, one, z, r, forced, time, sensor, score, parent, code
                 )
             else:
                 continue
@@ -220,7 +227,7 @@ def _run(
                 origin[i] = before[p]
                 said[i] = spoken[p] | what
                 if stage == 1:
-                    apply_position(motion, two, i, z, r, what, time, sensor)
+                    apply_position(motion, two, i, z, r, what, time, sensor, prior.sigma_velocity)
                 else:
                     _apply_velocity(motion, two, i, z, r, what, sensor)
             one, two = two, one
@@ -289,4 +296,5 @@ def _blank(motion: Motion, n: int) -> Found:
         np.zeros(n),
         np.zeros(n, np.int64),
         np.full(n, np.nan),
+        np.full((n, motion.axes), np.nan),
     )

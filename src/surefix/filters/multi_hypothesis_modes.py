@@ -15,7 +15,7 @@ from surefix.filters.hypothesis_trail import (
     Decisions,
     decide,
     follow,
-    run_lengths,
+    runs,
     undecided,
 )
 from surefix.filters.modes import (
@@ -58,6 +58,7 @@ def realtime_hypotheses(
         jump,
         since,
         found.run,
+        found.offset,
     )
 
 
@@ -80,7 +81,7 @@ def lagged_hypotheses(
     last = np.searchsorted(time, time + lag, side="right") - 1
     recovery, kept, said = _steady(prior), blank(motion, n), undecided(motion, n)
     state, parts = start(motion, recovery), []
-    head, done = 0, 0
+    seen, head, done = _seen(motion, epochs), 0, 0
     while head < n:
         slot = int(trail.best[head - 1]) if head else 0
         until = follow(motion, trail, head, slot, said)
@@ -91,7 +92,7 @@ def lagged_hypotheses(
         ready = max(int(np.searchsorted(last, until)), done)
         parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, ready))
         done = ready
-        first = min(decide(motion, trail, until, done, said), until)
+        first = min(decide(motion, seen, trail, until, done, said), until)
         before = state_before(motion, recovery, time, kept, first, state)
         state, out, count = _filter(motion, recovery, epochs, said, first, until + 1, before)
         write_rows(kept, first, out, count)
@@ -156,6 +157,11 @@ def decide_offline(
     return said, filtered, smoothed
 
 
+def _seen(motion: Motion, epochs: Epochs) -> BoolArray:
+    """Where each axis of the position was observed."""
+    return np.isfinite(epochs.z[:, : motion.axes])
+
+
 def _steady(prior: Prior) -> Recovery:
     """The filter that follows decisions: it never recovers by itself."""
     return Recovery(np.inf, prior.sigma_velocity, keeps_rate=True)
@@ -181,7 +187,7 @@ def _decided(motion: Motion, prior: Prior, epochs: Epochs) -> Decisions:
     """What the likeliest hypothesis at the end of the series says of all of it."""
     _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
     said = undecided(motion, len(epochs.time))
-    decide(motion, trail, len(epochs.time) - 1, 0, said)
+    decide(motion, _seen(motion, epochs), trail, len(epochs.time) - 1, 0, said)
     return said
 
 
@@ -200,10 +206,20 @@ def _in_both(time: FloatArray, ahead: IntArray, back: IntArray, apart: float) ->
 
 
 def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> Estimate:
-    """Add when jumps happened, and how long the runs were."""
-    seen = np.isfinite(epochs.z[:, : motion.axes])
+    """Add when jumps happened, how long the runs were, and how far off in the mean."""
+    seen = _seen(motion, epochs)
     used = np.where(seen, said.fixed[:, : motion.axes], np.nan)
     bits = ((said.jump[:, None] >> np.arange(motion.groups)) & 1).astype(np.bool_)
     since: FloatArray = np.where(bits, epochs.time[:, None], np.nan)
-    length = run_lengths(np.where(seen.any(axis=1), said.run, 0), used)
-    return whole._replace(jump=said.jump, since=since, run=length)
+    length, run = runs(np.where(seen.any(axis=1), said.run, 0), used)
+    off = epochs.z[:, : motion.axes] - whole.mean[:, : motion.axes]
+    if motion.period > 0.0:
+        off -= motion.period * np.rint(off / motion.period)
+    offset = np.full_like(off, np.nan)
+    for a in range(motion.axes):
+        known = (run >= 0) & seen[:, a]
+        total = np.bincount(run[known], off[known, a], minlength=len(run))
+        count = np.bincount(run[known], minlength=len(run))
+        inside = known & (count[run] > 0)
+        offset[inside, a] = total[run[inside]] / count[run[inside]]
+    return whole._replace(jump=said.jump, since=since, run=length, offset=offset)

@@ -158,6 +158,8 @@ class Estimate(NamedTuple):
         (n,) bit mask of groups that restarted here, and (n, groups) when the run began.
     run
         (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none.
+    offset
+        (n, axes) that offset; NaN outside of runs.
     """
 
     mean: FloatArray
@@ -168,3 +170,4 @@ class Estimate(NamedTuple):
     jump: IntArray
     since: FloatArray
     run: IntArray
+    offset: FloatArray

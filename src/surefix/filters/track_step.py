@@ -13,10 +13,12 @@ from surefix.models.motion import add_noise_factor, propagate_rows
 from surefix.robust.loss import Loss, weight
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["RECENT", "VAGUE", "predict_factor", "run"]
+__all__ = ["RECENT", "VAGUE", "VAGUE_RATE", "predict_factor", "run"]
 
 VAGUE = 1e6
 """m: standard deviation of a position nothing is known about."""
+VAGUE_RATE = 1e3
+"""m/s: … and of a rate that a decision made beforehand forgets."""
 RECENT = 5
 """Rejected observations remembered for a recovery."""
 _REJECTED = 0.1  # a weight below it counts as a rejection when waiting for a recovery
@@ -62,7 +64,7 @@ def _vague(
 
 @helper
 def _displace(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
-    """Forget the positions of the masked groups alone; the noise of the rates becomes their own."""
+    """Forget the masked positions, whose rates go on with noise of their own, or masked rates."""
     d, n = motion.axes, motion.order * motion.axes
     for c in range(d):
         if not (mask >> motion.group[c]) & 1:
@@ -81,6 +83,12 @@ def _displace(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
         else:
             A[v, n + v] = root
         A[c, n + c] = VAGUE
+    for c in range(d, 2 * d):
+        if (mask >> motion.group[c]) & 1:
+            for s in range(c, n, d):
+                for j in range(2 * n):
+                    A[s, j] = 0.0
+                A[s, n + s] = VAGUE_RATE
 
 
 @helper

@@ -90,7 +90,7 @@ def empty(form: Form) -> pa.Table:
     track = Track(none, axes, axes, axes, axes, axes)
     if not form.verdicts:
         return table(Batch(track), form)
-    verdicts = Verdicts(codes, none, none, axes, codes, none)
+    verdicts = Verdicts(codes, none, none, axes, codes, none, axes)
     return table(Batch(track, verdicts, (), codes, codes), form)
 
 

@@ -19,14 +19,15 @@ from surefix.cleaning.duplicates import (
     start_repeats,
 )
 from surefix.errors import InputError
+from surefix.filters.health import Health
 from surefix.pipelines.channels import CHANNEL_HEAD, ChannelState, clean_channel
+from surefix.pipelines.events import jump_events, run_events, sensor_events
 from surefix.pipelines.joining import join
 from surefix.pipelines.judge import (
     FilterState,
     begin,
     estimate,
     join_status,
-    jump_events,
     unjudged,
     verdicts,
     without_position,
@@ -66,6 +67,7 @@ class _Session:
     idle: BoolArray | None = None
     repeats: RepeatState | None = None
     filter: FilterState | None = None
+    health: Health | None = None
     last_tau: float = -np.inf
     next_grid: int | None = None
     channels: dict[tuple[str, str], ChannelState] = field(default_factory=dict)
@@ -241,6 +243,10 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     judged = Verdicts._make(column[fix] for column in judged)
     session.held += int((judged.reason == Reason.HELD).sum())
     events += jump_events(judged)
+    told = judged, track.time[fix], mine.fixes.sensor, session.sensors
+    events += run_events(*told, growing=options.mode == "realtime")
+    found_events, session.health = sensor_events(*told, session.health)
+    events += found_events
     return replace(
         nothing(tuple(session.sensors), options, setup),
         track=pick(track, fix),
@@ -256,9 +262,10 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
 
 def _all_axes(judged: Verdicts, axes: tuple[int, ...]) -> Verdicts:
     """Verdicts with a column for each of x, y, z."""
-    wide = np.full((len(judged.verdict), 3), np.nan)
+    wide, offset = (np.full((len(judged.verdict), 3), np.nan) for _ in range(2))
     wide[:, list(axes)] = judged.standardised
-    return judged._replace(standardised=wide)
+    offset[:, list(axes)] = judged.offset
+    return judged._replace(standardised=wide, offset=offset)
 
 
 def _repeats(session: _Session, rows: Rows) -> Repeats:

@@ -18,7 +18,7 @@ from surefix.filters.offline import offline
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery, TrackState
 from surefix.filters.track import start
 from surefix.pipelines.options import CleanOptions
-from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
+from surefix.types import BoolArray, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = [
     "FilterState",
@@ -27,12 +27,12 @@ __all__ = [
     "blank_status",
     "estimate",
     "join_status",
-    "jump_events",
     "unjudged",
     "verdicts",
     "without_position",
 ]
 
+_BY_THE_FILTER = (Reason.AGREES, Reason.OFF, Reason.ISOLATED, Reason.JUMP)
 _WHOLE = 0.98  # a weight from here on counts as used
 _NONE = 0.02  # a weight up to here counts as rejected
 _DOUBTFUL = 0.5  # … and a probability below this, where a weight is one
@@ -129,8 +129,8 @@ def verdicts(
     """Give every row its verdict.
 
     The weight is the smallest of the position groups that were observed. A fix is rejected where
-    its horizontal position (or its only group) is; a height rejected alone leaves it down-weighted.
-    Where each axis is judged by itself, so does one horizontal axis alone.
+    its horizontal position (or its only group) is, on one axis or both; a height rejected alone
+    leaves it down-weighted. Where each axis is judged by itself, the right ones are used.
 
     Parameters
     ----------
@@ -155,6 +155,8 @@ def verdicts(
     verdict[leading < _DOUBTFUL if several else leading <= _NONE] = Verdict.REJECTED
     reason = np.full(n, int(Reason.AGREES))
     reason[verdict != Verdict.USED] = Reason.OFF
+    if several:
+        reason[verdict == Verdict.REJECTED] = Reason.ISOLATED
     detail = np.full(n, np.nan)
     if groups > 1:
         low = np.nan_to_num(weight, nan=1.0) < (_DOUBTFUL if several else _WHOLE)
@@ -179,6 +181,7 @@ def verdicts(
         found.standardised[:, :d],
         reason.astype(np.int64),
         detail,
+        np.where((reason == Reason.RUN)[:, None], found.offset, np.nan),
     )
 
 
@@ -187,8 +190,8 @@ def _leading(weight: FloatArray, axes: tuple[int, ...], apart: bool) -> FloatArr
     leading = weight[:, 0].copy()
     for g in range(1, weight.shape[1]):
         beside = apart and axes[g] < 2
-        best = np.fmax(leading, weight[:, g]) if beside else leading
-        leading = np.where(np.isnan(best), weight[:, g], best)
+        worst = np.fmin(leading, weight[:, g]) if beside else leading
+        leading = np.where(np.isnan(worst), weight[:, g], worst)
     return leading
 
 
@@ -213,23 +216,11 @@ def join_status(status: Status, order: IntArray, extra: int) -> Status:
 
 def without_position(judged: Verdicts, lost: BoolArray) -> Verdicts:
     """Call a fix missing that brought a velocity at best, unless more is known of it."""
-    where = lost & np.isin(judged.reason, (Reason.AGREES, Reason.OFF, Reason.JUMP))
+    where = lost & np.isin(judged.reason, _BY_THE_FILTER)
     return judged._replace(
         verdict=np.where(where, int(Verdict.MISSING), judged.verdict),
         reason=np.where(where, int(Reason.NO_POSITION), judged.reason),
     )
-
-
-def jump_events(judged: Verdicts) -> list[Event]:
-    """Jumps of the track that were accepted."""
-    return [
-        Event(
-            "jump",
-            time,
-            "the track jumps: the fixes from here on agree with each other, not with those before",
-        )
-        for time in judged.detail[judged.reason == Reason.JUMP].tolist()
-    ]
 
 
 def unjudged(status: Status) -> Verdicts:
@@ -242,4 +233,5 @@ def unjudged(status: Status) -> Verdicts:
         np.full((n, 3), np.nan),
         np.where(status.verdict < 0, int(Reason.NO_POSITION), status.reason),
         status.detail,
+        np.full((n, 3), np.nan),
     )

@@ -68,7 +68,7 @@ class CleanOptions:
     """
 
     mode: Mode = "offline"
-    method: str = "igg3"
+    method: str = MULTI_HYPOTHESIS
     model: str = "auto"
     k0: float | None = None
     k1: float | None = None

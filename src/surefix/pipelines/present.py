@@ -64,7 +64,7 @@ def nothing(sensors: tuple[str, ...], options: CleanOptions, setup: Setup | None
         sources=(),
         sensors=sensors,
         track=Track(none, wide, wide, wide, wide, geodetic),
-        verdicts=Verdicts(whole, none, none, wide, whole, none),
+        verdicts=Verdicts(whole, none, none, wide, whole, none, wide),
         raw_position=wide,
         raw_coordinates=wide,
         sensor=whole,

@@ -179,4 +179,5 @@ def _verdicts(
         standardised=standardised[:, None],
         reason=reason,
         detail=np.where(check == Check.FROZEN, stream.time[held], np.nan),
+        offset=np.full((n, 1), np.nan),
     )

@@ -148,6 +148,7 @@ def chosen(verdicts: Verdicts, rows: IntArray) -> Verdicts:
         verdicts.standardised[rows],
         verdicts.reason[rows],
         verdicts.detail[rows],
+        verdicts.offset[rows],
     )
 
 

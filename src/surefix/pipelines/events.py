@@ -1,0 +1,110 @@
+"""Events of a cleaned log: what the verdicts say of more than one fix."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surefix.filters.health import SUSPECT, TRUSTED, Health, no_health, watch
+from surefix.reasons import vector
+from surefix.types import Event, FloatArray, IntArray, Reason, Verdict, Verdicts
+
+__all__ = ["jump_events", "run_events", "sensor_events"]
+
+_TOLD_FROM = 3  # fixes of a run that are worth an event
+_JUDGED = (Verdict.USED, Verdict.DOWNWEIGHTED, Verdict.REJECTED)
+
+
+def jump_events(judged: Verdicts) -> list[Event]:
+    """Jumps of the track that were accepted."""
+    return [
+        Event(
+            "jump",
+            time,
+            "the track jumps: the fixes from here on agree with each other, not with those before",
+        )
+        for time in judged.detail[judged.reason == Reason.JUMP].tolist()
+    ]
+
+
+def run_events(
+    judged: Verdicts, time: FloatArray, sensor: IntArray, sensors: list[str], *, growing: bool
+) -> list[Event]:
+    """Runs of fixes that are wrong together.
+
+    Parameters
+    ----------
+    judged
+        Verdicts of n fixes.
+    time, sensor
+        (n,) s, and which sensor each came from.
+    sensors
+        Names.
+    growing
+        Whether each fix counts those before it (real time), or all of its run (other modes).
+    """
+    events = []
+    before: tuple[float, ...] = ()
+    for k in np.flatnonzero(judged.reason == Reason.RUN).tolist():
+        count, offset = int(judged.detail[k]), judged.offset[k].tolist()
+        this = (float(sensor[k]), *np.nan_to_num(offset).tolist())
+        first = count == _TOLD_FROM if growing else count >= _TOLD_FROM and this != before
+        before = this
+        if first:
+            name = sensors[sensor[k]]
+            text = f"fixes of {name} are wrong together by {vector(offset)}"
+            text = text if growing else f"{count} {text}"
+            events.append(Event("run", float(time[k]), text))
+    return events
+
+
+def sensor_events(
+    judged: Verdicts,
+    time: FloatArray,
+    sensor: IntArray,
+    sensors: list[str],
+    health: Health | None,
+) -> tuple[list[Event], Health]:
+    """Sensors that are mostly rejected or noisier than was settled, and those that recover.
+
+    Parameters
+    ----------
+    judged, time, sensor, sensors
+        As for `run_events`.
+    health
+        Of the fixes before these; None at the beginning.
+
+    Returns
+    -------
+    events, health
+        What is to be told, and the record after these fixes.
+    """
+    health = _widened(health, len(sensors))
+    rows = np.flatnonzero(np.isin(judged.verdict, _JUDGED))
+    known = np.isfinite(judged.standardised[rows])
+    total = np.where(known, judged.standardised[rows], 0.0) ** 2
+    count = known.sum(axis=1)
+    square = np.where(count > 0, total.sum(axis=1) / np.maximum(count, 1), np.nan)
+    out = judged.verdict[rows] == Verdict.REJECTED
+    health, what, figure = watch(health, sensor[rows], out, square)
+    events = []
+    for i in np.flatnonzero(what).tolist():
+        name = sensors[sensor[rows[i]]]
+        if what[i] == SUSPECT:
+            kind, text = "sensor-suspect", f"{figure[i]:.0%} of the last fixes of {name} rejected"
+        elif what[i] == TRUSTED:
+            kind, text = "sensor-trusted", f"the fixes of {name} agree with the track again"
+        else:
+            kind = "noise-changed"
+            text = f"the noise of {name} is {figure[i]:.2g} × what was settled"
+        events.append(Event(kind, float(time[rows[i]]), text))
+    return events, health
+
+
+def _widened(health: Health | None, sensors: int) -> Health:
+    """The same with sensors added that were not known."""
+    fresh = no_health(sensors)
+    if health is None:
+        return fresh
+    for new, old in zip(fresh, health, strict=True):
+        new[: len(old)] = old
+    return fresh

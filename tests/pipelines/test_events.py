@@ -1,0 +1,78 @@
+"""Events from verdicts: runs of wrong fixes, sensors that fall and recover, noise that grows."""
+
+import numpy as np
+import pytest
+
+import surefix as sf
+
+MODES = ("realtime", "lagged", "offline")
+
+
+def dive(seed=1, n=1200):
+    rng = np.random.default_rng(seed)
+    t = np.arange(float(n))
+    truth = np.column_stack([0.5 * t + 5.0 * np.sin(t / 60.0), 0.2 * t])
+    return t, truth + rng.normal(0.0, 0.4, truth.shape)
+
+
+def told(t, fixes, mode, kind, **more):
+    log = {"time": 1.7e9 + t, "x": fixes[:, 0], "y": fixes[:, 1], **more}
+    found = sf.clean(log, options=sf.CleanOptions(mode=mode))
+    return [(event.time - 1.7e9, event.text) for event in found.events if event.kind == kind], found
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_run_is_told_with_its_offset(mode):
+    t, fixes = dive()
+    fixes[500:517] += [14.0, -27.0]
+    runs, found = told(t, fixes, mode, "run")
+    assert len(runs) == 1
+    time, text = runs[0]
+    assert time == (502.0 if mode == "realtime" else 500.0)
+    assert "wrong together by (1" in text
+    if mode != "realtime":
+        assert text.startswith("17 fixes of ")
+    off = found.verdicts.offset[510]
+    np.testing.assert_allclose(off[:2], [14.0, -27.0], atol=0.6)
+    assert np.isnan(off[2])
+    assert np.isnan(found.verdicts.offset[300]).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_log_of_isolated_errors_has_no_such_events(mode):
+    t, fixes = dive(2)
+    bad = np.random.default_rng(5).random(len(t)) < 0.1
+    fixes[bad] += np.random.default_rng(6).normal(0.0, 30.0, (bad.sum(), 2))
+    for kind in ("run", "jump", "sensor-suspect", "noise-changed"):
+        assert not told(t, fixes, mode, kind)[0], kind
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_sensor_that_goes_mad_is_suspect_until_it_agrees_again(mode):
+    """Another one carries the track meanwhile."""
+    t, fixes = dive(3)
+    _, others = dive(4)
+    fixes[400:600] += np.random.default_rng(7).normal(0.0, 50.0, (200, 2))
+    both = np.empty((2 * len(t), 2))
+    both[::2], both[1::2] = fixes, others
+    names = np.resize(["usbl", "gnss"], len(both))
+    time = np.repeat(t, 2) + np.resize([0.0, 0.3], len(both))
+    fell, found = told(time, both, mode, "sensor-suspect", sensor=names)
+    rose = [event for event in found.events if event.kind == "sensor-trusted"]
+    assert len(fell) == len(rose) == 1
+    assert "usbl" in fell[0][1]
+    assert 400.0 < fell[0][0] < 440.0
+    assert 600.0 < rose[0].time - 1.7e9 < 700.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_noise_that_grows_is_told(mode):
+    """What was settled is given, so that the log as a whole cannot settle something between."""
+    t, fixes = dive(5, 3000)
+    fixes[1500:] += np.random.default_rng(8).normal(0.0, 1.6, (1500, 2))
+    log = {"time": 1.7e9 + t, "x": fixes[:, 0], "y": fixes[:, 1]}
+    options = sf.CleanOptions(mode=mode, method="huber", sigma_position=0.4)
+    found = sf.clean(log, options=options)
+    changed = [event for event in found.events if event.kind == "noise-changed"]
+    assert changed
+    assert changed[0].time - 1.7e9 > 1500.0
