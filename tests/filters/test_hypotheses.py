@@ -26,7 +26,7 @@ NAMES = {2: "cv", 3: "ca"}
 
 def prior_of(axes, **changes):
     """Every account has its chance."""
-    made = Prior(0.2, 0.23, 0.15, 0.17, 0.19, 4.0, 0.2, 0.7, np.repeat([8.0, 2.0], axes), 2.0)
+    made = Prior(0.2, 0.23, 0.15, 0.17, 0.19, 4.0, 0.05, 0.2, 0.7, np.repeat([8.0, 2.0], axes), 2.0)
     return made._replace(**changes)
 
 
@@ -83,7 +83,10 @@ def agrees(motion, prior, epochs, first):
     accounts = twin[-1].accounts
     assert bank.number[0] == len(accounts)
     for k, mixture in enumerate(twin):
-        np.testing.assert_allclose(found.mean[k], mixture.mean, rtol=1e-7, atol=1e-7)
+        off = found.mean[k] - mixture.mean
+        if motion.period > 0.0:
+            off[0] -= motion.period * np.rint(off[0] / motion.period)
+        np.testing.assert_allclose(off, 0.0, atol=1e-6)
         np.testing.assert_allclose(found.sigma[k], mixture.sigma, rtol=1e-6, atol=1e-7)
         assert found.evidence[k] == pytest.approx(mixture.evidence, abs=1e-8)
     weights = np.sort([account.weight for account in accounts])
@@ -111,6 +114,7 @@ SAID = {
     "aided": {"moves", "slips", "poor"},
     "three axes": {"offx", "offy", "offz", "offxy"},
     "lost": {"anew"},
+    "one axis": {"turns"},
 }
 
 
@@ -137,7 +141,7 @@ def test_what_is_dropped_and_merged_is_next_to_nothing(how):
         bank, found, twin = compared(motion, prior, epochs, prior)
         whole = bank.number[0] == len(twin[-1].accounts)
         for k, mixture in enumerate(twin):
-            scale = 1e-8 if whole else 0.02
+            scale = 1e-8 if whole else 0.03
             error = np.abs(found.mean[k] - mixture.mean) / mixture.sigma
             assert error.max() < scale
             assert np.abs(np.log(found.sigma[k] / mixture.sigma)).max() < scale

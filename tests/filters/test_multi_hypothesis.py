@@ -20,7 +20,9 @@ def prior_of(motion, sigma=0.5, *, velocity=0.1, longest=40.0, **changes):
 def certain(motion):
     """A prior under which nothing is ever wrong."""
     no = IMPOSSIBLE
-    return Prior(no, no, no, no, no, 1e9, no, no, np.ones(2 * motion.axes), NEVER.sigma_velocity)
+    return Prior(
+        no, no, no, no, no, 1e9, no, no, no, np.ones(2 * motion.axes), NEVER.sigma_velocity
+    )
 
 
 def run(motion, prior, epochs, **how):

@@ -30,7 +30,8 @@ class Account(NamedTuple):
     Per axis: ``rows`` the used observations (step, component, offsets, value, variance),
     ``offsets`` how many there are, ``lasting`` those that became jumps, ``open`` that of the run.
     ``lost`` is when fixes began to be left out and how many were; ``rate`` what a velocity had been
-    before anything was seen. ``said`` is a word or two per epoch.
+    before anything was seen; ``turns`` after which steps it changed at once, and by how much.
+    ``said`` is a word or two per epoch.
     """
 
     weight: float
@@ -47,6 +48,8 @@ class Account(NamedTuple):
     slip: tuple = ()
     lost: tuple = ()
     rate: tuple = ()
+    turns: tuple = ()
+    touched: int = -1
     said: tuple = ()
 
 
@@ -81,7 +84,9 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
     """
     d, none = motion.axes, ((),) * motion.axes
     empty = Account(0.0, none, (0,) * d, none, (None,) * d, (False,) * d, slip=(0.0,) * d)
-    empty = empty._replace(lost=((np.nan, 0),) * d, rate=((0, prior.sigma_velocity),) * d)
+    empty = empty._replace(
+        lost=((np.nan, 0),) * d, rate=((0, prior.sigma_velocity),) * d, turns=none
+    )
     accounts, out, steps = [empty], [], []
     later = prior
     for k, time in enumerate(epochs.time):
@@ -98,7 +103,7 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
             many = []
             for account in accounts:
                 known = [_moments(motion, prior, steps, account, a) for a in range(d)]
-                many += branches(motion, prior, account, known, z, r, time, sensor, len(steps) - 1)
+                many += branches(motion, prior, account, known, z, r, time, sensor, steps)
             accounts, gain = _kept(many, far)
             evidence += gain
         accounts = [_lasting(prior, account, time) for account in accounts]
@@ -140,6 +145,8 @@ def _united(motion, prior, steps, accounts, alike):
 
 def _same(figures, offsets, others, their_offsets, alike):
     """Whether all means are near each other, and the variances of the states."""
+    if len(offsets) != len(their_offsets):
+        return False
     m, P = np.array([*figures, *offsets]).T
     other, spread = np.array([*others, *their_offsets]).T
     ratio = (spread / P)[: len(figures)]
@@ -161,9 +168,12 @@ def _joint(motion, prior, steps, account, a):
     for k in range(begun + 1, count):
         dt = steps[k] - steps[k - 1]
         G = noise_factor(NAMES[n], 1, dt, motion.density[a])
-        rows = np.hstack([-transition(NAMES[n], 1, dt), np.eye(n)])
+        F = transition(NAMES[n], 1, dt)
+        turn = F[:, 1] * sum(sigma for step, sigma in account.turns[a] if step == k - 1)
+        Q = G @ G.T + np.outer(turn, turn)
+        rows = np.hstack([-F, np.eye(n)])
         at = slice(n * (k - 1), n * (k + 1))
-        information[at, at] += rows.T @ np.linalg.solve(G @ G.T, rows)
+        information[at, at] += rows.T @ np.linalg.solve(Q, rows)
     for k, component, offsets, value, variance in account.rows[a]:
         h = np.zeros(size)
         h[n * k + component] = 1.0
@@ -199,9 +209,9 @@ def _set(values, a, value):
     return (*values[:a], value, *values[a + 1 :])
 
 
-def _velocity(motion, prior, account, known, z, r, time, sensor, step):
+def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     """Belongs, usual or poor, or is wrong."""
-    d = motion.axes
+    d, step = motion.axes, len(steps) - 1
     seen = [a for a in range(d) if not np.isnan(z[d + a])]
     nu = {a: z[d + a] - known[a][0][1] for a in seen}
     S = {a: known[a][1][1, 1] + r[d + a] for a in seen}
@@ -214,17 +224,40 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, step):
         wrong = prior.again
         alike = sum(normal(nu[a] - account.slip[a], S[a] + r[d + a]) for a in seen)
         outside = np.logaddexp(outside + np.log(1.0 - ALIKE), alike + np.log(ALIKE))
-    rows, slip = account.rows, account.slip
+    rows, slip, turns = account.rows, account.slip, account.turns
+    free = np.array([prior.sigma_velocity**2 + S[a] for a in seen])
     for a in seen:
         variance = r[d + a] * (POOR if poor > usual else 1.0)
         rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
         slip = _set(slip, a, nu[a])
+        speed = max(prior.sigma_velocity, HASTE * abs(nu[a]))
+        turns = _set(turns, a, (*turns[a], (account.touched, speed)))
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty = account.faulty
-    return [
-        _told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}),
+    out = [
+        _told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step),
         _told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
+    before = account.touched >= 0 and time > steps[account.touched]
+    strange = sum(nu[a] ** 2 / S[a] for a in seen) > GROSS
+    if strange and before and prior.manoeuvre > 0.0:
+        gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
+        gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
+        plain = account.rows
+        for a in seen:
+            plain = _set(plain, a, (*plain[a], (step, 1, (), z[d + a], r[d + a])))
+        out.append(
+            _told(
+                account,
+                gain,
+                "turns",
+                rows=plain,
+                faulty=faulty - {sensor},
+                turns=turns,
+                touched=step,
+            )
+        )
+    return out
 
 
 def _use(account, z, variance, time, step, axes, period, known, *, running=False):
@@ -246,10 +279,12 @@ def _use(account, z, variance, time, step, axes, period, known, *, running=False
         seen = _set(seen, a, True)
     new = any(seen) and np.isnan(account.began)
     began = time if new else account.began
-    return account._replace(rows=rows, seen=seen, lost=lost, began=began)
+    touched = step if len(axes) else account.touched
+    return account._replace(rows=rows, seen=seen, lost=lost, began=began, touched=touched)
 
 
-def _position(motion, prior, account, known, z, r, time, sensor, step):
+def _position(motion, prior, account, known, z, r, time, sensor, steps):
+    step = len(steps) - 1
     d, period = motion.axes, motion.period
     axes = [a for a in range(d) if not np.isnan(z[a])]
     inside, poor, square, wide, distance, shifted = {}, 0.0, {}, {}, 0.0, 0.0
@@ -308,6 +343,19 @@ def _position(motion, prior, account, known, z, r, time, sensor, step):
         known = [(np.append(m[:-1], 0.0), P) for m, P in known]
         begun = _use(begun, z, r, time, step, axes, period, known, running=True)
         out.append(_told(begun, wild(axes) + np.log(prior.burst), "open"))
+    touched = account.touched
+    gap = time - steps[touched] if touched >= 0 else 0.0
+    if distance > GROSS and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
+        free = np.array(
+            [(gap * prior.sigma_velocity) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
+        )
+        off = {a: _wrap(z[a] - known[a][0][0], period) for a in axes}
+        gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
+        turns = account.turns
+        for a in axes:
+            speed = max(prior.sigma_velocity, HASTE * abs(off[a]) / gap)
+            turns = _set(turns, a, (*turns[a], (touched, speed)))
+        out.append(_told(used(account._replace(turns=turns), axes), gain, "turns"))
     due = [a for a in axes if account.seen[a] and _due(prior, account.lost[a], time)]
     if due and (due == axes or not own):
         fresh = account
@@ -334,6 +382,7 @@ def _forgotten(account, a, step, speed):
         lasting=_set(account.lasting, a, ()),
         seen=_set(account.seen, a, False),
         rate=_set(account.rate, a, (step, speed)),
+        turns=_set(account.turns, a, ()),
     )
 
 

@@ -14,6 +14,7 @@ __all__ = [
     "CONTINUE",
     "DENY",
     "DROP",
+    "MANOEUVRE",
     "MOST",
     "MOST_SENSORS",
     "OPEN",
@@ -47,6 +48,8 @@ VELOCITY_POOR: Final = 512
 DENY: Final = 1024
 RESTART: Final = 2048
 """Bits 11 … 13: the axes whose track begins anew with this fix."""
+MANOEUVRE: Final = 16384
+"""The rates changed at once, after the last observation before this one that was used."""
 
 POOR_WEIGHT: Final = 0.25
 """Weight of an observation that belongs to the track but is twice as noisy as usual."""
@@ -70,6 +73,8 @@ class Prior(NamedTuple):
     longest
         Longest run, s: what lasts longer is a true jump, dated back to its first fix. No run may
         outlast the track that it contradicts.
+    manoeuvre
+        Probability that the vehicle changes its velocity at once.
     velocity, again
         Probability that a velocity is wrong, and that it is if the last one was.
     spread
@@ -84,6 +89,7 @@ class Prior(NamedTuple):
     burst: float
     ending: float
     longest: float
+    manoeuvre: float
     velocity: float
     again: float
     spread: FloatArray
@@ -122,6 +128,8 @@ class Bank(NamedTuple):
         (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
     lost, missed
         (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
+    touched
+        (k,) s, when an observation was last used.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -140,6 +148,7 @@ class Bank(NamedTuple):
     slip: FloatArray
     lost: FloatArray
     missed: IntArray
+    touched: FloatArray
     announced: FloatArray
 
 
@@ -200,5 +209,6 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d)),
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
+        np.full(most, np.nan),
         np.full(1, np.nan),
     )

@@ -9,7 +9,19 @@ from __future__ import annotations
 from surefix.jit import helper
 from surefix.types import FloatArray
 
-__all__ = ["begin_anew", "commit", "forget", "open_run", "predict_axis", "update_axis"]
+__all__ = [
+    "HASTE",
+    "begin_anew",
+    "change_rate",
+    "commit",
+    "forget",
+    "open_run",
+    "predict_axis",
+    "update_axis",
+]
+
+HASTE = 2.0
+"""A rate that is forgotten may be so many times what the next fix says."""
 
 
 @helper
@@ -120,6 +132,15 @@ def update_axis(
         P[i, i] = max(P[i, i], 0.0)
         for j in range(i):
             P[i, j] = P[j, i]
+
+
+@helper
+def change_rate(P: FloatArray, gap: float, speed: float) -> None:
+    """Let the velocity have changed at once by 0 ± ``speed``, ``gap`` seconds ago."""
+    P[0, 0] += gap * gap * speed * speed
+    P[0, 1] += gap * speed * speed
+    P[1, 0] = P[0, 1]
+    P[1, 1] += speed * speed
 
 
 @helper

@@ -11,6 +11,7 @@ from surefix.filters.hypotheses import (
     CONTINUE,
     DENY,
     DROP,
+    MANOEUVRE,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -18,7 +19,15 @@ from surefix.filters.hypotheses import (
     Bank,
     Found,
 )
-from surefix.filters.hypothesis_axis import begin_anew, commit, forget, open_run, update_axis
+from surefix.filters.hypothesis_axis import (
+    HASTE,
+    begin_anew,
+    change_rate,
+    commit,
+    forget,
+    open_run,
+    update_axis,
+)
 from surefix.filters.hypothesis_branches import wrapped
 from surefix.filters.records import Motion
 from surefix.jit import helper
@@ -27,7 +36,6 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["apply_position", "best_of", "copy_hypothesis", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
-_HASTE = 2.0  # a track that begins anew may be so much faster than it went away
 _ANEW = 7 * RESTART
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
@@ -49,6 +57,7 @@ def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> N
     to.opened[i] = source.opened[k]
     to.length[i] = source.length[k]
     to.faulty[i] = source.faulty[k]
+    to.touched[i] = source.touched[k]
 
 
 @helper
@@ -130,6 +139,7 @@ def apply_position(
         bank.missed[k] = 0
     elif code & DENY:
         bank.opened[k] = time
+    used = False
     for a in range(motion.axes):
         m = bank.mean[k, a]
         P = bank.covariance[k, a]
@@ -143,7 +153,7 @@ def apply_position(
             continue
         if code & (RESTART << a):
             far = abs(wrapped(z[a] - m[0], motion.period)) / (time - bank.lost[k, a])
-            begin_anew(m, P, n, max(speed, _HASTE * far))
+            begin_anew(m, P, n, max(speed, HASTE * far))
             bank.seen[k, a] = False
             bank.began[k] = time
         if running or (code >> a) & 1:
@@ -154,6 +164,7 @@ def apply_position(
             bank.missed[k, a] = 0
         if (code >> a) & 1:
             continue
+        used = True
         if not bank.seen[k, a]:
             bank.seen[k, a] = True
             if math.isnan(bank.began[k]):
@@ -165,6 +176,9 @@ def apply_position(
             P[0, 0] = variance[a]
             continue
         nu = wrapped(z[a] - m[0], motion.period)
+        if code & MANOEUVRE:
+            gap = time - bank.touched[k]
+            change_rate(P, gap, max(speed, HASTE * abs(nu) / gap))
         if code & POOR:
             update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
         elif code & OPEN:
@@ -174,6 +188,8 @@ def apply_position(
             update_axis(m, P, n, 0, True, nu, variance[a])
         else:
             update_axis(m, P, n, 0, False, nu, variance[a])
+    if used:
+        bank.touched[k] = time
 
 
 @helper

@@ -11,6 +11,7 @@ from surefix.filters.hypotheses import (
     CONTINUE,
     DENY,
     DROP,
+    MANOEUVRE,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -34,7 +35,7 @@ __all__ = [
     "wrapped",
 ]
 
-BRANCHES = 13
+BRANCHES = 14
 """Candidates that a hypothesis can have at one epoch, at most."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
@@ -100,12 +101,13 @@ def velocity_branches(
     z: FloatArray,
     variance: FloatArray,
     forced: FloatArray,
+    time: float,
     sensor: int,
     score: FloatArray,
     parent: IntArray,
     code: IntArray,
 ) -> int:
-    """Candidates of an observed velocity: it belongs to the track, or not."""
+    """Candidates of an observed velocity at ``time``: it belongs to the track, or not."""
     d, total = motion.axes, 0
     for k in range(bank.number[0]):
         inside = 0.0
@@ -113,6 +115,9 @@ def velocity_branches(
         square = 0.0
         scale = 0.0
         alike = 0.0
+        distance = 0.0
+        swift = 0.0
+        quick = 0.0
         seen = 0
         for a in range(d):
             c = d + a
@@ -125,6 +130,10 @@ def velocity_branches(
             wide = prior.spread[c] * prior.spread[c] + S
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
+            distance += nu * nu / S
+            free = prior.sigma_velocity * prior.sigma_velocity + S
+            swift += nu * nu / free
+            quick += 0.5 * math.log(free)
             change = nu - bank.slip[k, a]
             alike += log_normal(change, S + variance[c])
             seen += 1
@@ -142,6 +151,12 @@ def velocity_branches(
         if not forced[d] > 0.0:
             score[total] = bank.weight[k] + outside + math.log(out)
             parent[total], code[total] = k, VELOCITY_OUT
+            total += 1
+        strange = math.isnan(forced[d]) and distance > _GROSS
+        if strange and time > bank.touched[k] and prior.manoeuvre > 0.0:
+            score[total] = bank.weight[k] + log_wild(swift, quick, seen)
+            score[total] += math.log(prior.manoeuvre) + math.log1p(-out)
+            parent[total], code[total] = k, MANOEUVRE
             total += 1
     return total
 
@@ -186,6 +201,9 @@ def position_branches(
         offset = 0.0
         poor = 0.0
         distance = 0.0
+        swift = 0.0
+        quick = 0.0
+        gap = time - bank.touched[k]
         unknown = False
         for a in range(d):
             if math.isnan(z[a]):
@@ -201,6 +219,9 @@ def position_branches(
                 inside[a] = log_normal(nu, S)
                 poor += log_normal(nu, S + variance[a] * _POORER)
                 distance += nu * nu / S
+                free = gap * gap * prior.sigma_velocity * prior.sigma_velocity + S
+                swift += nu * nu / free
+                quick += 0.5 * math.log(free)
                 wide[a] = s2 + S
                 wild[a] = nu * nu / wide[a]
                 if bank.run[k] >= 0:
@@ -239,9 +260,14 @@ def position_branches(
         score[total] = base + outside + math.log(prior.isolated)
         parent[total], code[total] = k, mask
         total += 1
-        if distance > _GROSS and not unknown and (bank.run[k] < 0 or own):
+        strange = distance > _GROSS and not unknown
+        if strange and (bank.run[k] < 0 or own):
             score[total] = base + outside + math.log(prior.burst)
             parent[total], code[total] = k, OPEN
+            total += 1
+        if strange and gap > 0.0 and not own and prior.manoeuvre > 0.0:
+            score[total] = base + log_wild(swift, quick, observed) + math.log(prior.manoeuvre)
+            parent[total], code[total] = k, MANOEUVRE
             total += 1
         if own and not unknown:
             staying = 1.0 - prior.isolated - prior.ending

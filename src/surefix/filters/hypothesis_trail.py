@@ -9,6 +9,7 @@ import numpy as np
 from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
+    MANOEUVRE,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -73,14 +74,25 @@ def _write(decisions: Decisions, k: int, code: int, axes: int, running: bool) ->
 
 
 @helper
-def _untold(decisions: Decisions, first: int) -> bool:
+def _untold(decisions: Decisions, first: int, every: int) -> bool:
     """Whether the run that reaches back beyond ``first`` was told as a run, not as a jump."""
     for k in range(first - 1, -1, -1):
         if decisions.run[k]:
             return True
-        if decisions.jump[k]:
+        if decisions.jump[k] & every:
             return False
     return True
+
+
+@helper
+def _touched(motion: Motion, seen: BoolArray, code: int) -> bool:
+    """Whether anything of an epoch was used, be it in a run."""
+    for a in range(motion.axes):
+        if seen[a] and not (code >> a) & 1:
+            return True
+        if seen[motion.axes + a] and not code & VELOCITY_OUT:
+            return True
+    return False
 
 
 @kernel
@@ -96,7 +108,8 @@ def decide(
 
     A jump that is dated back further than ``first`` is put there. A track that began anew did so at
     the first fix that was left out, or, if that is before ``first``, at the one that it began with.
-    ``seen`` (n, axes) tells where positions were observed.
+    A manoeuvre is put after the last observation used before it. ``seen`` (n, 2·axes) tells what
+    was observed.
 
     Returns
     -------
@@ -108,10 +121,17 @@ def decide(
     changed = head
     every = (1 << motion.axes) - 1
     both = 1 | 1 << motion.axes
+    turned = -1  # the earliest epoch after which the rates may have changed
     anew = np.full(motion.axes, -1)  # the fix of a restart …
     lost = np.full(motion.axes, -1)  # … and the earliest one left out before it
     for k in range(head, first - 1, -1):
         code = trail.code[k, slot]
+        if turned >= 0 and _touched(motion, seen[k], code):
+            decisions.jump[turned] |= every << motion.axes
+            changed = min(changed, turned)
+            turned = -1
+        elif turned >= 0:
+            turned = k
         for a in range(motion.axes):
             if lost[a] < 0 or not seen[k, a]:
                 continue
@@ -125,7 +145,7 @@ def decide(
             committed = True
         running = code & (OPEN | CONTINUE) != 0
         jump = 0
-        if committed and (code & OPEN or (k == first and _untold(decisions, first))):
+        if committed and (code & OPEN or (k == first and _untold(decisions, first, every))):
             jump = every
         inside = running and not committed
         same = decisions.jump[k] == jump
@@ -139,10 +159,15 @@ def decide(
         decisions.run[k] = 1 if inside else 0
         if code & OPEN:
             committed = False
+        if code & MANOEUVRE:
+            turned = k
         for a in range(motion.axes):
             if code & (RESTART << a):
                 anew[a] = lost[a] = k
         slot = trail.parent[k, slot]
+    if turned >= 0:
+        decisions.jump[turned] |= every << motion.axes
+        changed = min(changed, turned)
     for a in range(motion.axes):
         if lost[a] >= 0:
             at = anew[a] if first > 0 else lost[a]
@@ -155,7 +180,7 @@ def decide(
 def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisions) -> int:
     """Write decisions from ``head`` on as long as the likeliest hypothesis descends from ``slot``.
 
-    What dates something back ends it: a jump, or a track that began anew.
+    What dates something back ends it: a jump, a manoeuvre, or a track that began anew.
 
     Returns
     -------
@@ -166,7 +191,7 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
     for k in range(head, n):
         best = trail.best[k]
         code = trail.code[k, best]
-        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | 7 * RESTART)):
+        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | MANOEUVRE | 7 * RESTART)):
             return k
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)

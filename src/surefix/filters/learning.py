@@ -33,6 +33,7 @@ _SHARES = {
     "isolated": (2.0, 50.0),
     "partial": (0.2, 50.0),
     "poor": (0.5, 50.0),
+    "manoeuvre": (0.02, 100.0),
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
@@ -83,6 +84,7 @@ def supposed(
         burst=0.001,
         ending=1.0 / 15.0,
         longest=longest,
+        manoeuvre=2e-4,
         velocity=0.02,
         again=0.9,
         spread=np.repeat([_WILD * sigma_position, _WILD * sigma_velocity], axes),
@@ -131,7 +133,7 @@ def learn(
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
-        prior = _counted(prior, said.fixed, residual, math.sqrt(float(np.median(epochs.variance))))
+        prior = _counted(prior, said, residual, math.sqrt(float(np.median(epochs.variance))))
         before = figures
         figures = _likeliest(sample, said, prior, given, before, least, motion)
         if _change(before, figures) < _ENOUGH:
@@ -162,15 +164,22 @@ def _usual(figures: NoiseFigures) -> tuple[float, float]:
     return position, velocity
 
 
-def _counted(prior: Prior, fixed: FloatArray, residual: FloatArray, sigma: float) -> Prior:
+def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) -> Prior:
     """Shares and size of the gross errors among the positions that were decided."""
+    fixed = said.fixed
     axes = fixed.shape[1] // 2
     seen = np.isfinite(residual[:, :axes])
     out = seen & (fixed[:, :axes] == 0.0)
     whole = out.any(axis=1) & (out == seen).all(axis=1)
     poor = (fixed[:, :axes] == POOR_WEIGHT).any(axis=1) & seen.any(axis=1)
     some = out.any(axis=1) & ~whole
-    counts = {"isolated": whole.sum(), "partial": some.sum(), "poor": poor.sum()}
+    turns = (said.jump >> axes > 0).sum()
+    counts = {
+        "isolated": whole.sum(),
+        "partial": some.sum(),
+        "poor": poor.sum(),
+        "manoeuvre": turns,
+    }
     total = seen.any(axis=1).sum()
     shares = {
         name: float((counts[name] + wrong) / (total + everything))

@@ -19,6 +19,7 @@ import numpy as np
 from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
+    MANOEUVRE,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -29,7 +30,7 @@ from surefix.filters.hypotheses import (
     Prior,
     Trail,
 )
-from surefix.filters.hypothesis_axis import begin_anew, commit, predict_axis, update_axis
+from surefix.filters.hypothesis_axis import HASTE, change_rate, commit, predict_axis, update_axis
 from surefix.filters.hypothesis_bank import (
     apply_position,
     best_of,
@@ -70,8 +71,17 @@ def _innovate(motion: Motion, bank: Bank, k: int, z: FloatArray, r: FloatArray, 
 
 @helper
 def _apply_velocity(
-    motion: Motion, bank: Bank, i: int, z: FloatArray, r: FloatArray, code: int, sensor: int
+    motion: Motion,
+    bank: Bank,
+    i: int,
+    z: FloatArray,
+    r: FloatArray,
+    code: int,
+    time: float,
+    sensor: int,
+    speed: float,
 ) -> None:
+    """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
     if code & VELOCITY_OUT:
         bank.faulty[i] |= bit
@@ -84,17 +94,20 @@ def _apply_velocity(
     for a in range(d):
         if not math.isnan(z[d + a]):
             m, P = bank.mean[i, a], bank.covariance[i, a]
-            update_axis(m, P, motion.order + 1, 1, False, z[d + a] - m[1], r[d + a] / weight)
+            nu = z[d + a] - m[1]
+            if code & MANOEUVRE:
+                change_rate(P, time - bank.touched[i], max(speed, HASTE * abs(nu)))
+            update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
+    bank.touched[i] = time
 
 
 @helper
 def _displace(motion: Motion, bank: Bank, jump: int) -> None:
     """Forget the positions, or the rates, that jump here by a decision made beforehand."""
-    n = motion.order + 1
     for i in range(bank.number[0]):
         for a in range(motion.axes):
             if (jump >> (motion.axes + a)) & 1:
-                begin_anew(bank.mean[i, a], bank.covariance[i, a], n, VAGUE_RATE)
+                change_rate(bank.covariance[i, a], 0.0, VAGUE_RATE)
             if (jump >> a) & 1:
                 bank.seen[i, a] = False
 
@@ -183,16 +196,19 @@ def _run(
     said, spoken = np.empty(most, np.int64), np.empty(most, np.int64)
     keep = np.empty(most, np.bool_)
     swaps = 0
+    speed = prior.sigma_velocity
     time = one.time[0]
     if math.isnan(time):
         for a in range(d):
             for s in range(1, motion.order):
-                one.covariance[0, a, s, s] = prior.sigma_velocity * prior.sigma_velocity
+                one.covariance[0, a, s, s] = speed * speed
     for k in range(len(epochs.time)):
         dt = 0.0 if math.isnan(time) else epochs.time[k] - time
         time = epochs.time[k]
         sensor = epochs.sensor[k] if len(epochs.sensor) else 0
         z, r, forced = epochs.z[k], epochs.variance[k], epochs.fixed[k]
+        if epochs.jump[k]:
+            _displace(motion, one, epochs.jump[k])
         for i in range(one.number[0]):
             origin[i], said[i] = i, 0
             if dt > 0.0:
@@ -200,8 +216,6 @@ def _run(
                     predict_axis(
                         one.mean[i, a], one.covariance[i, a], motion.order, dt, motion.density[a]
                     )
-        if epochs.jump[k]:
-            _displace(motion, one, epochs.jump[k])
         _innovate(motion, one, k, z, r, found)
         placed = moved = False
         for a in range(d):
@@ -210,7 +224,7 @@ def _run(
         for stage in range(2):
             if stage == 0 and moved:
                 total = velocity_branches(
-                    motion, prior, one, z, r, forced, sensor, score, parent, code
+                    motion, prior, one, z, r, forced, time, sensor, score, parent, code
                 )
             elif stage == 1 and placed:
                 total = position_branches(
@@ -227,9 +241,9 @@ def _run(
                 origin[i] = before[p]
                 said[i] = spoken[p] | what
                 if stage == 1:
-                    apply_position(motion, two, i, z, r, what, time, sensor, prior.sigma_velocity)
+                    apply_position(motion, two, i, z, r, what, time, sensor, speed)
                 else:
-                    _apply_velocity(motion, two, i, z, r, what, sensor)
+                    _apply_velocity(motion, two, i, z, r, what, time, sensor, speed)
             one, two = two, one
             one.number[0] = count
             swaps += 1

@@ -81,7 +81,7 @@ def lagged_hypotheses(
     last = np.searchsorted(time, time + lag, side="right") - 1
     recovery, kept, said = _steady(prior), blank(motion, n), undecided(motion, n)
     state, parts = start(motion, recovery), []
-    seen, head, done = _seen(motion, epochs), 0, 0
+    seen, head, done = np.isfinite(epochs.z), 0, 0
     while head < n:
         slot = int(trail.best[head - 1]) if head else 0
         until = follow(motion, trail, head, slot, said)
@@ -157,11 +157,6 @@ def decide_offline(
     return said, filtered, smoothed
 
 
-def _seen(motion: Motion, epochs: Epochs) -> BoolArray:
-    """Where each axis of the position was observed."""
-    return np.isfinite(epochs.z[:, : motion.axes])
-
-
 def _steady(prior: Prior) -> Recovery:
     """The filter that follows decisions: it never recovers by itself."""
     return Recovery(np.inf, prior.sigma_velocity, keeps_rate=True)
@@ -187,7 +182,7 @@ def _decided(motion: Motion, prior: Prior, epochs: Epochs) -> Decisions:
     """What the likeliest hypothesis at the end of the series says of all of it."""
     _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
     said = undecided(motion, len(epochs.time))
-    decide(motion, _seen(motion, epochs), trail, len(epochs.time) - 1, 0, said)
+    decide(motion, np.isfinite(epochs.z), trail, len(epochs.time) - 1, 0, said)
     return said
 
 
@@ -197,17 +192,19 @@ def _in_both(time: FloatArray, ahead: IntArray, back: IntArray, apart: float) ->
     One that only one direction sees belongs to a run at an end of the log, which is too short to be
     believed against the rest.
     """
-    known = time[np.minimum(np.flatnonzero(back) + 1, len(time) - 1)]
     jump = np.zeros_like(ahead)
-    for k in np.flatnonzero(ahead):
-        if len(known) and np.abs(known - time[k]).min() <= apart:
-            jump[k] = ahead[k]
+    for bit in range(int(np.bitwise_or.reduce(ahead, initial=0)).bit_length()):
+        told = np.flatnonzero((back >> bit) & 1)
+        known = time[np.minimum(told + 1, len(time) - 1)]
+        for k in np.flatnonzero((ahead >> bit) & 1):
+            if len(known) and np.abs(known - time[k]).min() <= apart:
+                jump[k] |= 1 << bit
     return jump
 
 
 def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> Estimate:
     """Add when jumps happened, how long the runs were, and how far off in the mean."""
-    seen = _seen(motion, epochs)
+    seen = np.isfinite(epochs.z[:, : motion.axes])
     used = np.where(seen, said.fixed[:, : motion.axes], np.nan)
     bits = ((said.jump[:, None] >> np.arange(motion.groups)) & 1).astype(np.bool_)
     since: FloatArray = np.where(bits, epochs.time[:, None], np.nan)

@@ -63,32 +63,49 @@ def _vague(
 
 
 @helper
-def _displace(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
-    """Forget the masked positions, whose rates go on with noise of their own, or masked rates."""
-    d, n = motion.axes, motion.order * motion.axes
+def _cut(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
+    """Cut positions, or rates, from the past: the noise of what goes on becomes its own.
+
+    A rate that is cut has changed by 0 ± `VAGUE_RATE` before the step.
+    """
+    d, m = motion.axes, motion.order
+    n = m * d
+    B = np.zeros((m, m + 1))
+    L = np.zeros((m, m))
     for c in range(d):
-        if not (mask >> motion.group[c]) & 1:
+        placed = (mask >> motion.group[c]) & 1
+        turned = (mask >> motion.group[d + c]) & 1
+        if not (placed or turned):
             continue
-        for j in range(2 * n):
-            A[c, j] = 0.0
-        root = math.sqrt(motion.density[c] * dt)
-        v = d + c
-        A[v, n + c] = 0.0
-        if motion.order == 3:
-            a = 2 * d + c
-            A[a, n + c] = 0.0
-            A[v, n + v] = root * dt / math.sqrt(3.0)
-            A[a, n + v] = root * math.sqrt(3.0) / 2.0
-            A[a, n + a] = root / 2.0
-        else:
-            A[v, n + v] = root
-        A[c, n + c] = VAGUE
-    for c in range(d, 2 * d):
-        if (mask >> motion.group[c]) & 1:
-            for s in range(c, n, d):
-                for j in range(2 * n):
-                    A[s, j] = 0.0
-                A[s, n + s] = VAGUE_RATE
+        for i in range(m):
+            for j in range(m):
+                B[i, j] = A[c + i * d, n + c + j * d]
+            B[i, m] = 0.0
+        if turned:
+            B[0, m] = dt * VAGUE_RATE
+            B[1, m] = VAGUE_RATE
+        first = 1 if placed else 0
+        for i in range(first, m):  # Gram and Schmidt on the rows
+            for l in range(first, i):
+                L[i, l] = 0.0
+                for j in range(m + 1):
+                    L[i, l] += B[i, j] * B[l, j]
+                for j in range(m + 1):
+                    B[i, j] -= L[i, l] * B[l, j]
+            length = 0.0
+            for j in range(m + 1):
+                length += B[i, j] * B[i, j]
+            L[i, i] = math.sqrt(length)
+            if length > 0.0:
+                for j in range(m + 1):
+                    B[i, j] /= L[i, i]
+        for i in range(first, m):
+            for j in range(m):
+                A[c + i * d, n + c + j * d] = L[i, j] if first <= j <= i else 0.0
+        if placed:
+            for j in range(2 * n):
+                A[c, j] = 0.0
+            A[c, n + c] = VAGUE
 
 
 @helper
@@ -102,15 +119,15 @@ def predict_factor(
 ) -> None:
     """Write ``[F S, G]`` into ``A`` (n, 2n): a factor of the predicted covariance, not yet square.
 
-    Groups in the bit mask ``jump`` restart: their rows become vague and independent of the past,
-    or only those of their positions if ``recovery.keeps_rate``.
+    Groups in the bit mask ``jump`` restart: their rows become vague and independent of the past.
+    With ``recovery.keeps_rate`` those of positions leave the rates alone, and the other way round.
     """
     n = motion.order * motion.axes
     _load(A, S, n)
     propagate_rows(A, motion.order, motion.axes, dt, n)
     add_noise_factor(A, motion.order, motion.axes, dt, motion.density, n)
     if jump and recovery.keeps_rate:
-        _displace(A, motion, dt, jump)
+        _cut(A, motion, dt, jump)
     elif jump:
         _vague(A, motion, jump, VAGUE, recovery.sigma_velocity)
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
+from surefix.filters.hypotheses import Prior
+from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis
@@ -31,7 +33,6 @@ __all__ = ["CHANNEL_HEAD", "ChannelState", "clean_channel"]
 CHANNEL_HEAD = 2000
 """Values that a series is settled on in real time; the other modes see it whole."""
 
-_RECOVERY_VALUES = 30
 _LAG_VALUES = 20
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
@@ -48,6 +49,7 @@ class ChannelState(NamedTuple):
     lag: float = 0.0
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
+    prior: Prior | None = None
     filter: FilterState | None = None
 
     def nothing(self) -> Channel:
@@ -118,13 +120,13 @@ def clean_channel(
         options,
         state.motion,
         state.recovery,
-        None,
+        state.prior,
         state.lag,
         epochs,
         np.ones(n, np.bool_),
         state.filter,
     )
-    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=False)
+    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=options.several)
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
     known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
@@ -167,10 +169,19 @@ def _settle(
     steps = steps[steps > 0.0]
     interval = float(np.median(steps)) if len(steps) else 1.0
     turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
-    recovery = Recovery(
-        float(options.recovery_s or _RECOVERY_VALUES * interval),
-        max(speed_scale(tau[seen], turned), 1e-6),
-    )
+    speed = max(speed_scale(tau[seen], turned), 1e-6)
+    recovery, prior = Recovery(options.patience(interval), speed), None
+    if options.several:
+        figures, prior = learn(
+            observations,
+            unknown,
+            figures,
+            order=order,
+            period=new.period,
+            speed=speed,
+            longest=recovery.after,
+            floor=(max(quantum / 12.0**0.5, 1e-9), 1e-9),
+        )
     motion = Motion(order, 1, np.array([figures.process**2]), by_axis(1), 2, new.period)
     unit = new.name.rsplit("_", 1)[-1]
     sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
@@ -190,5 +201,6 @@ def _settle(
         lag=float(options.lag_s or _LAG_VALUES * interval),
         sigma=sigma,
         noise=noise,
-        filter=begin(options, motion, recovery, None),
+        prior=prior,
+        filter=begin(options, motion, recovery, prior),
     )

@@ -10,7 +10,7 @@ from surefix.filters.hypotheses import Prior
 from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
-from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
+from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
 from surefix.types import FloatArray, Noise
 
@@ -89,7 +89,7 @@ def settle_noise(
     }
     model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
     blocks = tried[model]
-    if options.method == MULTI_HYPOTHESIS:
+    if options.several:
         blocks = [_learnt(block, model, speed, longest) for block in blocks]
     sigma_position = np.full((len(sensors), 3), np.nan)
     sigma_velocity = np.full((len(sensors), 3), np.nan)

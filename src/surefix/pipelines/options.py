@@ -23,6 +23,10 @@ METHODS = (MULTI_HYPOTHESIS, *LOSSES, _CIPRA_ROMERA, *THRESHOLDS)
 """Names of the estimators: several hypotheses, one with a robust loss, or a cleaner before it."""
 
 
+_RECOVERY = 30.0  # intervals of unbroken rejection after which a sensor is believed again
+_RUN = 39.5  # … longest run of wrong observations that several hypotheses survive
+
+
 @dataclass(frozen=True, kw_only=True)
 class CleanOptions:
     """How a log is cleaned. Every figure left at None is taken from the data and reported.
@@ -127,17 +131,22 @@ class CleanOptions:
 
     @property
     def loss(self) -> Loss:
-        """The robust loss these options ask for; none for a cleaner.
-
-        Several hypotheses take positions alone; the series beside them go through IGG3.
-        """
-        if self.decider is not None:
+        """The robust loss these options ask for; none for a cleaner or several hypotheses."""
+        if self.several or self.decider is not None:
             return loss_named("kalman")
-        if self.method == MULTI_HYPOTHESIS:
-            return loss_named("igg3")
         if self.method == _CIPRA_ROMERA:
             return loss_named("huber", k0=self.k0)._replace(by_noise=1)
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
+
+    @property
+    def several(self) -> bool:
+        """Whether several hypotheses are kept."""
+        return self.method == MULTI_HYPOTHESIS
+
+    def patience(self, interval: float) -> float:
+        """Seconds of wrong observations, ``interval`` apart, that are survived at most."""
+        usual = _RUN if self.several else _RECOVERY
+        return float(self.recovery_s or usual * interval)
 
     @property
     def decider(self) -> Decider | None:

@@ -15,7 +15,7 @@ from surefix.filters.track import by_axis, by_block
 from surefix.geo.local_frame import LocalFrame, origin_of, rotate
 from surefix.models.motion import MODELS
 from surefix.pipelines.noise import settle_noise
-from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions
+from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows
 from surefix.types import BoolArray, Event, FloatArray, Noise
 
@@ -24,8 +24,6 @@ __all__ = ["FARTHEST", "Setup", "localise", "settle"]
 FARTHEST = 1e9
 """m: what lies beyond is as wild as what lies there, and its square is finite."""
 _LAG_FIXES = 20
-_RECOVERY_FIXES = 30
-_RUN_FIXES = 39.5  # longest run of wrong fixes that several hypotheses survive
 _FEW_HEIGHTS = 3  # heights that show an offset
 _ANOTHER_DEPTH = 200.0  # m: a depth that differs more is not the vehicle's
 _DISAGREE = 3.0  # standard errors beyond which a height offset is more than chance
@@ -124,8 +122,7 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
             f"a lag of {options.lag_s:g} s with method {options.method}",
             f"at least {least:.3g} s, the time of the fixes it looks ahead",
         )
-    several = options.method == MULTI_HYPOTHESIS
-    after = float(options.recovery_s or (_RUN_FIXES if several else _RECOVERY_FIXES) * interval)
+    after = options.patience(interval)
     speed = max([*(_speed(rows, position, i) for i in axes), 1e-3])
     figures = settle_noise(rows, position, velocity, axes, sensors, options, speed, after)
     group = by_axis(len(axes)) if options.by_axis else by_block(axes)
