@@ -22,7 +22,10 @@ _PRINTED = ("rmse_ratio", "back_fixes")
 def compare(
     methods: Annotated[
         str | None,
-        typer.Option(metavar="NAME,NAME,…", help="Values of --method of clean; default several."),
+        typer.Option(
+            metavar="NAME,NAME,…",
+            help="Values of --method of clean, or gnc, wolf, imm, sage-husa; default several; all.",
+        ),
     ] = None,
     scenarios: Annotated[
         str | None, typer.Option(metavar="NAME,NAME,…", help="What goes wrong; default everything.")

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from surefix.comparison.figures import figures
 from surefix.comparison.findings import findings
 from surefix.comparison.merit import ORACLE, Outcome, Outcomes, judge, judge_oracle
+from surefix.comparison.methods import cleaner_of, works_in
 from surefix.comparison.options import CompareOptions, world_of
 from surefix.comparison.oracle import lag_of, oracle
 from surefix.comparison.tables import tables
@@ -79,12 +80,17 @@ def outcomes(
         From `surefix.simulate.contamination.draw`, with or without velocities.
     methods, modes
         As in `CompareOptions`.
+
+    Returns
+    -------
+    outcomes
+        By mode and method, of the methods that work in the mode.
     """
     found = {}
     for mode in modes:
         best = oracle(trial, mode)
         found[mode, ORACLE] = judge_oracle(trial, best, mode)
-        for method in methods:
+        for method in (each for each in methods if works_in(each, mode)):
             found[mode, method] = judge(trial, clean_trial(trial, method, mode), best, mode)
     return found
 
@@ -97,18 +103,19 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
     trial
         What is to be cleaned. Its scenario may want a wrong noise to be given.
     method, mode
-        Of `surefix.pipelines.options.CleanOptions`.
+        Of `CompareOptions`.
     """
+    cleaner, estimator = cleaner_of(method)
     told = trial.scenario.misjudged * trial.world.sigma_m
     wrong = told if trial.scenario.misjudged != 1.0 else None
     options = CleanOptions(
         mode=mode,
-        method=method,
+        method=cleaner,
         lag_s=lag_of(trial) if mode == "lagged" else None,
         sigma_position=wrong,
         sigma_height=wrong,
     )
-    return clean_sources(open_inputs([columns(trial)]), options)
+    return clean_sources(open_inputs([columns(trial)]), options, estimator)
 
 
 def _tasks(options: CompareOptions) -> Iterator[_Task]:
