@@ -25,8 +25,8 @@ class CompareOptions:
     Parameters
     ----------
     methods
-        Of ``surefix.comparison.methods.COMPARED``: those of `surefix clean`, and baselines. One that
-        does not work in a mode has no figure there.
+        Of ``surefix.comparison.methods.COMPARED``: those of `surefix clean`, and baselines. One
+        that does not work in a mode has no figure there.
     scenarios
         Names of `surefix.simulate.contamination.SCENARIOS`.
     modes

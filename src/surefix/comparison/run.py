@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import NamedTuple
 
 from surefix.comparison.figures import figures
@@ -14,6 +11,7 @@ from surefix.comparison.merit import ORACLE, Outcome, Outcomes, judge, judge_ora
 from surefix.comparison.methods import cleaner_of, works_in
 from surefix.comparison.options import CompareOptions, world_of
 from surefix.comparison.oracle import lag_of, oracle
+from surefix.comparison.share import shared
 from surefix.comparison.tables import tables
 from surefix.experiment import Experiment, Progress
 from surefix.pipelines.clean import clean_sources
@@ -46,7 +44,7 @@ def compare(options: CompareOptions, progress: Progress | None = None) -> Experi
         Told the number of finished trials, of ``options.trials``.
     """
     found: list[Outcomes] = []
-    for done, each in enumerate(_done(_tasks(options), options.jobs), start=1):
+    for done, each in enumerate(shared(_run, _tasks(options), options.jobs), start=1):
         found.append(each)
         if progress is not None:
             progress(done)
@@ -123,16 +121,6 @@ def _tasks(options: CompareOptions) -> Iterator[_Task]:
         world = world_of(options, i)
         for scenario in options.scenarios:
             yield _Task(scenario, world, (options.seed, i), options.methods, options.modes)
-
-
-def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[Outcomes]:
-    """Results in the order of the tasks."""
-    if jobs == 1:
-        yield from map(_run, tasks)
-        return
-    context, deaf = get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)  # this process will tell
-    with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=deaf) as pool:
-        yield from pool.map(_run, tasks)
 
 
 def _run(task: _Task) -> Outcomes:
