@@ -141,7 +141,7 @@ def _log_likelihood(before: Belief, observation: Observation, variance: FloatArr
 
 
 class _Adapted(NamedTuple):
-    """A belief, (m,) the factors on the variances found by now, and the least of them."""
+    """A belief, and (m,) the factors on the variances that were found by now."""
 
     belief: Belief
     factor: FloatArray
