@@ -16,6 +16,7 @@ from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
+from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Velocity, keep_inputs
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
 
@@ -38,24 +39,6 @@ _SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
     list[Path], typer.Argument(help="Logs: CSV, Parquet or NMEA 0183.", show_default=False)
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="ROLE=COLUMN[:UNIT]",
-        help="What a column means, such as time=lcm_timestamp:us or z=-depth; repeatable.",
-    ),
-]
-Depth = Annotated[Path | None, typer.Option(help="Log of a depth sensor that supports the fixes.")]
-Velocity = Annotated[
-    Path | None, typer.Option(help="Log of a velocity sensor that supports the fixes.")
-]
-Heading = Annotated[
-    Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
-]
-NoChecksum = Annotated[
-    bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
@@ -182,7 +165,7 @@ def clean(
     )
     check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
-    _keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
+    keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
@@ -270,7 +253,7 @@ def reproduce(
 
     check_report(report)
     check_place("--json", json_file)
-    _keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
+    keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
     with over_runs(runs) as told:
         experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)
     tell(experiment, experiment, json_file, report)
@@ -345,14 +328,6 @@ def _seconds(option: str, text: str | None) -> float | None:
     except ValueError:
         pass
     raise OptionsError(f"{option} {text!r}", "a duration such as 0.5s, 200ms or 2min")
-
-
-def _keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
-    """Refuse to write over what is read."""
-    read = {path.resolve() for path in inputs}
-    for path in outputs:
-        if path.resolve() in read:
-            raise OptionsError(f"output {path} is also an input", "another name")
 
 
 def _print(found: dict[str, Any], text: list[str], as_json: bool) -> None:

@@ -1,5 +1,6 @@
 """Acoustic logs of real dives: the wild fixes go, the track stays."""
 
+import json
 from itertools import product
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from acceptance.product import clean, local, off_the_line, read, step_speeds
+from acceptance.product import clean, local, off_the_line, read, step_speeds, surefix
 
 FOLDER = "usbl_mbari"
 SURVEY, PRESSURE = "oi_survey_1913_MINIROV_USBL_LATLONG.csv", "oi_survey_1913_COMPAS_DEPTH.csv"
@@ -93,6 +94,19 @@ def test_a_clean_survey_stays_whole(data, tmp_path):
     assert len(track) == 396
     assert (track.verdict == "rejected").mean() < 0.04
     assert np.hypot(track.vx, track.vy).max() <= 1.5
+
+
+def test_fixes_left_out_tell_which_method_follows_wild_ones(data, tmp_path):
+    told = tmp_path / "told.json"
+    words = ("--methods", "kalman,igg3", "--folds", 2, "--jobs", 1, "--json", told)
+    log = data / FOLDER / SURVEY
+    done = surefix("compare", "--log", log, "--column", "time=lcm_timestamp:us", *words)
+    assert done.code == 0, done.err
+    held = json.loads(told.read_text(encoding="utf-8"))["tables"]
+    for kalman, igg3 in held["score_nats-offline"].values():
+        assert kalman < igg3
+    ((kalman, igg3),) = held["fastest_mps-offline"].values()
+    assert igg3 < 1.5 < kalman
 
 
 @pytest.fixture(scope="module")

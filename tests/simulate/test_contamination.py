@@ -76,6 +76,24 @@ def test_a_burst_has_30_of_121_errors(seed):
 
 @pytest.mark.parametrize("axes", [1, 2, 3])
 @pytest.mark.parametrize("seed", SEEDS)
+def test_a_drag_goes_out_and_back_without_a_step(seed, axes):
+    world = World(epochs=800, axes=axes, sigma_m=0.3)
+    trial = draw("drag", world, seed)
+    apart = np.flatnonzero(np.abs(sizes(trial) - 60.0) < 1e-9)  # isolated errors are other lengths
+    (top,) = apart
+    stretch = slice(top - 59, top + 60)
+    np.testing.assert_allclose(sizes(trial)[stretch], [*range(1, 61), *range(59, 0, -1)])
+    arrow = trial.error[stretch] / sizes(trial)[stretch, None]
+    np.testing.assert_allclose(arrow, np.broadcast_to(arrow[0], arrow.shape), atol=1e-12)
+    others = trial.bad_fix.any(axis=1)
+    others[stretch] = False
+    assert others.sum() == 40
+    np.testing.assert_array_equal(trial.position, draw("clean", world, seed).position)
+    assert not trial.bad_velocity.any()
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_jump_moves_truth_and_fixes_but_not_the_velocity(seed, axes):
     world = World(epochs=500, axes=axes)
     trial, calm = draw("jump", world, seed), draw("clean", world, seed)

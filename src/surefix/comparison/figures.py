@@ -85,8 +85,9 @@ def _errors(options: CompareOptions, scenario: str, first: Mapping[str, Outcomes
     panels = []
     for mode in options.modes:
         lines = {
-            method: first[scenario][kind, mode, method].error
+            method: outcome.error
             for method in (ORACLE, *options.methods)
+            if (outcome := first[scenario].get((kind, mode, method))) is not None
         }
         panels.append(
             Panel(

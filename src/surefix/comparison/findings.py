@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from surefix.comparison.methods import works_in
 from surefix.comparison.options import CompareOptions
 from surefix.comparison.tables import KIND_WORDS, MODE_WORDS
 from surefix.experiment import Table
@@ -25,7 +26,10 @@ def findings(options: CompareOptions, tables: Mapping[str, Table]) -> tuple[str,
         All tables by key.
     """
     return tuple(
-        _sentence(method, mode, tables) for mode in options.modes for method in options.methods
+        _sentence(method, mode, tables)
+        for mode in options.modes
+        for method in options.methods
+        if works_in(method, mode)
     )
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import NamedTuple
 
 from surefix.comparison.figures import figures
 from surefix.comparison.findings import findings
 from surefix.comparison.merit import ORACLE, Outcome, Outcomes, judge, judge_oracle
+from surefix.comparison.methods import cleaner_of, works_in
 from surefix.comparison.options import CompareOptions, world_of
 from surefix.comparison.oracle import lag_of, oracle
+from surefix.comparison.share import shared
 from surefix.comparison.tables import tables
 from surefix.experiment import Experiment, Progress
 from surefix.pipelines.clean import clean_sources
@@ -45,7 +44,7 @@ def compare(options: CompareOptions, progress: Progress | None = None) -> Experi
         Told the number of finished trials, of ``options.trials``.
     """
     found: list[Outcomes] = []
-    for done, each in enumerate(_done(_tasks(options), options.jobs), start=1):
+    for done, each in enumerate(shared(_run, _tasks(options), options.jobs), start=1):
         found.append(each)
         if progress is not None:
             progress(done)
@@ -79,12 +78,17 @@ def outcomes(
         From `surefix.simulate.contamination.draw`, with or without velocities.
     methods, modes
         As in `CompareOptions`.
+
+    Returns
+    -------
+    outcomes
+        By mode and method, of the methods that work in the mode.
     """
     found = {}
     for mode in modes:
         best = oracle(trial, mode)
         found[mode, ORACLE] = judge_oracle(trial, best, mode)
-        for method in methods:
+        for method in (each for each in methods if works_in(each, mode)):
             found[mode, method] = judge(trial, clean_trial(trial, method, mode), best, mode)
     return found
 
@@ -97,18 +101,19 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
     trial
         What is to be cleaned. Its scenario may want a wrong noise to be given.
     method, mode
-        Of `surefix.pipelines.options.CleanOptions`.
+        Of `CompareOptions`.
     """
+    cleaner, estimator = cleaner_of(method)
     told = trial.scenario.misjudged * trial.world.sigma_m
     wrong = told if trial.scenario.misjudged != 1.0 else None
     options = CleanOptions(
         mode=mode,
-        method=method,
+        method=cleaner,
         lag_s=lag_of(trial) if mode == "lagged" else None,
         sigma_position=wrong,
         sigma_height=wrong,
     )
-    return clean_sources(open_inputs([columns(trial)]), options)
+    return clean_sources(open_inputs([columns(trial)]), options, estimator)
 
 
 def _tasks(options: CompareOptions) -> Iterator[_Task]:
@@ -116,16 +121,6 @@ def _tasks(options: CompareOptions) -> Iterator[_Task]:
         world = world_of(options, i)
         for scenario in options.scenarios:
             yield _Task(scenario, world, (options.seed, i), options.methods, options.modes)
-
-
-def _done(tasks: Iterator[_Task], jobs: int) -> Iterator[Outcomes]:
-    """Results in the order of the tasks."""
-    if jobs == 1:
-        yield from map(_run, tasks)
-        return
-    context, deaf = get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)  # this process will tell
-    with ProcessPoolExecutor(jobs, context, initializer=signal.signal, initargs=deaf) as pool:
-        yield from pool.map(_run, tasks)
 
 
 def _run(task: _Task) -> Outcomes:

@@ -6,7 +6,7 @@ time many. The numbers do not depend on the batches.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from surefix.cleaning.duplicates import (
 )
 from surefix.errors import InputError
 from surefix.filters.health import Health
+from surefix.filters.records import Epochs, Estimate, Motion, Recovery
 from surefix.pipelines.channels import CHANNEL_HEAD, ChannelState, clean_channel
 from surefix.pipelines.events import jump_events, run_events, sensor_events
 from surefix.pipelines.joining import join
@@ -50,8 +51,13 @@ from surefix.types import (
     Verdicts,
 )
 
-__all__ = ["HEAD", "clean_batches", "clean_sources"]
+__all__ = ["HEAD", "Estimator", "clean_batches", "clean_sources"]
 
+Estimator = Callable[[Motion, Recovery, Epochs, object], tuple[object, Estimate]]
+"""Estimates a series in the place of the method: takes and gives what it remembers, None at first.
+
+What it gets is prepared as for the method that the options name, and judged in the same way.
+"""
 HEAD = 20_000
 """Rows that a log is settled on in real time; the other modes see it whole."""
 _PORTION = 50_000  # rows cleaned at a time in real time; at least HEAD
@@ -62,6 +68,8 @@ class _Session:
     """What is carried from batch to batch."""
 
     options: CleanOptions
+    estimator: Estimator | None = None
+    memory: object = None  # of the estimator
     sensors: list[str] = field(default_factory=list)
     setup: Setup | None = None
     idle: BoolArray | None = None
@@ -77,12 +85,16 @@ class _Session:
     held: int = 0
 
 
-def clean_sources(sources: Iterable[Source], options: CleanOptions) -> Cleaned:
+def clean_sources(
+    sources: Iterable[Source], options: CleanOptions, estimator: Estimator | None = None
+) -> Cleaned:
     """Clean whole sources and give one result; arguments as for `clean_batches`."""
-    return join(list(clean_batches(sources, options)))
+    return join(list(clean_batches(sources, options, estimator)))
 
 
-def clean_batches(sources: Iterable[Source], options: CleanOptions) -> Iterator[Cleaned]:
+def clean_batches(
+    sources: Iterable[Source], options: CleanOptions, estimator: Estimator | None = None
+) -> Iterator[Cleaned]:
     """Clean sources batch by batch; only real time gives more than one batch.
 
     Parameters
@@ -91,6 +103,8 @@ def clean_batches(sources: Iterable[Source], options: CleanOptions) -> Iterator[
         The first role is ``fixes``; others support it.
     options
         How to clean.
+    estimator
+        One that is not among the methods; None for the method of the options.
 
     Raises
     ------
@@ -98,7 +112,7 @@ def clean_batches(sources: Iterable[Source], options: CleanOptions) -> Iterator[
         There is nothing to clean: no fix, no series.
     """
     inputs = list(sources)
-    session = _Session(options, names=tuple(source.name for source in inputs))
+    session = _Session(options, estimator, names=tuple(source.name for source in inputs))
     waiting: list[Chunk] = []
     problems: list[Problem] = []
     rows, anything = 0, False
@@ -216,7 +230,11 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     auxiliary = np.concatenate([rows.auxiliary, np.zeros(len(grid), np.bool_)])[order]
     found = None
     judged = unjudged(known)
-    if session.filter is not None:
+    if session.filter is not None and session.estimator is not None:
+        session.memory, found = session.estimator(
+            setup.motion, setup.recovery, epochs, session.memory
+        )
+    elif session.filter is not None:
         session.filter, found = estimate(
             options,
             setup.motion,
@@ -227,6 +245,7 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
             ~auxiliary,
             session.filter,
         )
+    if found is not None:
         several = setup.prior is not None
         judged = verdicts(found, epochs, setup.motion, known, setup.axes, several=several)
         judged = _all_axes(judged, setup.axes)

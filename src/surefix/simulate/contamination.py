@@ -25,6 +25,8 @@ _GOOD_BEFORE = 5  # fixes at the beginning without errors, unless the first is t
 _BURST = 30  # fixes of the longest run of errors
 _GAP = (10.0, 60.0)  # intervals a dropout lasts
 _VELOCITY_RUN = (5, 40)  # epochs a run of wrong velocities lasts
+_DRAG = 60  # fixes over which a drag grows, and as many over which it goes back …
+_PULL = 1.0  # … by so many σ from one fix to the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +96,9 @@ class Scenario:
     run
         Whether 30 fixes on end err too: with one ``common`` offset, or each ``independent`` of the
         others.
+    drag
+        Whether the fixes drift away for 60 intervals, by 1 σ from each to the next, and back as
+        slowly: an error without any step.
     first_bad
         The very first fix is a gross error.
     jump
@@ -118,6 +123,7 @@ class Scenario:
     size: tuple[float, float] = _GROSS
     one_axis: bool = False
     run: Literal["common", "independent"] | None = None
+    drag: bool = False
     first_bad: bool = False
     jump: float = 0.0
     misjudged: float = 1.0
@@ -138,6 +144,7 @@ SCENARIOS: Final[Mapping[str, Scenario]] = MappingProxyType(
         "isolated-40": Scenario(share=0.4),
         "burst-common": Scenario(share=_BESIDE_BURST, run="common"),
         "burst-independent": Scenario(share=_BESIDE_BURST, run="independent"),
+        "drag": Scenario(drag=True),
         "jump": Scenario(jump=67.0),
         "small": Scenario(share=0.2, size=(3.3, 10.0)),
         "one-axis": Scenario(share=0.2, one_axis=True),
@@ -328,8 +335,9 @@ def _errors(
 ) -> FloatArray:
     """(n, d) gross errors in σ."""
     error = np.zeros((n, d))
-    first = int(where.integers(_GOOD_BEFORE + 20, n - _BURST)) if plan.run else n
-    stretch = np.arange(first, min(first + _BURST, n))
+    length = _BURST if plan.run else 2 * _DRAG - 1 if plan.drag else 0
+    first = int(where.integers(_GOOD_BEFORE + 20, n - length)) if length else n
+    stretch = np.arange(first, first + length)
     others = np.setdiff1d(np.arange(_GOOD_BEFORE, n), [*stretch, jump])
     rows = where.choice(others, min(round(plan.share * n), len(others)), replace=False)
     if plan.first_bad:
@@ -339,6 +347,9 @@ def _errors(
         error[stretch] = _lengths(sizes, plan, 1) * _directions(sizes, 1, d)
     elif plan.run == "independent":
         error[stretch] = _lengths(sizes, plan, len(stretch)) * _directions(sizes, len(stretch), d)
+    elif plan.drag:
+        off = _PULL * (_DRAG - np.abs(np.arange(1 - _DRAG, _DRAG)))
+        error[stretch] = off[:, None] * _directions(sizes, 1, d)
     return error
 
 

@@ -1,0 +1,45 @@
+"""Options of the command line about what is read, shared by the commands that read logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from surefix.errors import OptionsError
+
+__all__ = ["Columns", "Depth", "Heading", "NoChecksum", "Velocity", "keep_inputs"]
+
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="ROLE=COLUMN[:UNIT]",
+        help="What a column means, such as time=lcm_timestamp:us or z=-depth; repeatable.",
+    ),
+]
+Depth = Annotated[Path | None, typer.Option(help="Log of a depth sensor that supports the fixes.")]
+Velocity = Annotated[
+    Path | None, typer.Option(help="Log of a velocity sensor that supports the fixes.")
+]
+Heading = Annotated[
+    Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
+]
+NoChecksum = Annotated[
+    bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
+]
+
+
+def keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
+    """Refuse to write over what is read.
+
+    Raises
+    ------
+    OptionsError
+        An output is also an input.
+    """
+    read = {path.resolve() for path in inputs}
+    for path in outputs:
+        if path.resolve() in read:
+            raise OptionsError(f"output {path} is also an input", "another name")
