@@ -169,7 +169,7 @@ def _joint(motion, prior, steps, account, a):
         dt = steps[k] - steps[k - 1]
         G = noise_factor(NAMES[n], 1, dt, motion.density[a])
         F = transition(NAMES[n], 1, dt)
-        turn = F[:, 1] * sum(sigma for step, sigma in account.turns[a] if step == k - 1)
+        turn = F[:, n - 1] * sum(sigma for step, sigma in account.turns[a] if step == k - 1)
         Q = G @ G.T + np.outer(turn, turn)
         rows = np.hstack([-F, np.eye(n)])
         at = slice(n * (k - 1), n * (k + 1))
@@ -224,40 +224,35 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
         wrong = prior.again
         alike = sum(normal(nu[a] - account.slip[a], S[a] + r[d + a]) for a in seen)
         outside = np.logaddexp(outside + np.log(1.0 - ALIKE), alike + np.log(ALIKE))
-    rows, slip, turns = account.rows, account.slip, account.turns
-    free = np.array([prior.sigma_velocity**2 + S[a] for a in seen])
+    rows, slip = account.rows, account.slip
     for a in seen:
         variance = r[d + a] * (POOR if poor > usual else 1.0)
         rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
         slip = _set(slip, a, nu[a])
-        speed = max(prior.sigma_velocity, HASTE * abs(nu[a]))
-        turns = _set(turns, a, (*turns[a], (account.touched, speed)))
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty = account.faulty
     out = [
         _told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step),
         _told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
-    before = account.touched >= 0 and time > steps[account.touched]
+    gap = time - steps[account.touched] if account.touched >= 0 else 0.0
     strange = sum(nu[a] ** 2 / S[a] for a in seen) > GROSS
-    if strange and before and prior.manoeuvre > 0.0:
-        gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
-        gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
-        plain = account.rows
-        for a in seen:
-            plain = _set(plain, a, (*plain[a], (step, 1, (), z[d + a], r[d + a])))
-        out.append(
-            _told(
-                account,
-                gain,
-                "turns",
-                rows=plain,
-                faulty=faulty - {sensor},
-                turns=turns,
-                touched=step,
-            )
-        )
-    return out
+    if not strange or not gap > 0.0 or not prior.manoeuvre > 0.0:
+        return out
+    far = _reach(motion.order, 1, gap)
+    free = np.array([(far * prior.sigma_velocity) ** 2 + S[a] for a in seen])
+    gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
+    gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
+    rows, turns = account.rows, account.turns
+    for a in seen:
+        rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], r[d + a])))
+        speed = max(prior.sigma_velocity, HASTE * abs(nu[a]) / far)
+        turns = _set(turns, a, (*turns[a], (account.touched, speed)))
+    faulty = faulty - {sensor}
+    return [
+        *out,
+        _told(account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=step),
+    ]
 
 
 def _use(account, z, variance, time, step, axes, period, known, *, running=False):
@@ -346,14 +341,15 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
     touched = account.touched
     gap = time - steps[touched] if touched >= 0 else 0.0
     if distance > GROSS and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
+        far = _reach(motion.order, 0, gap)
         free = np.array(
-            [(gap * prior.sigma_velocity) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
+            [(far * prior.sigma_velocity) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
         )
         off = {a: _wrap(z[a] - known[a][0][0], period) for a in axes}
         gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
         turns = account.turns
         for a in axes:
-            speed = max(prior.sigma_velocity, HASTE * abs(off[a]) / gap)
+            speed = max(prior.sigma_velocity, HASTE * abs(off[a]) / far)
             turns = _set(turns, a, (*turns[a], (touched, speed)))
         out.append(_told(used(account._replace(turns=turns), axes), gain, "turns"))
     due = [a for a in axes if account.seen[a] and _due(prior, account.lost[a], time)]
@@ -367,6 +363,11 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         fresh = used(fresh._replace(**over, began=time), axes)
         out.append(_told(fresh, gain, "anew"))
     return out
+
+
+def _reach(order, component, gap):
+    """What a unit of the highest rate does to a component in a time."""
+    return transition(NAMES[order], 1, gap)[component, order - 1]
 
 
 def _due(prior, lost, time):

@@ -49,7 +49,7 @@ DENY: Final = 1024
 RESTART: Final = 2048
 """Bits 11 … 13: the axes whose track begins anew with this fix."""
 MANOEUVRE: Final = 16384
-"""The rates changed at once, after the last observation before this one that was used."""
+"""The highest rate changed at once, after the last observation before this one that was used."""
 
 POOR_WEIGHT: Final = 0.25
 """Weight of an observation that belongs to the track but is twice as noisy as usual."""
@@ -74,7 +74,7 @@ class Prior(NamedTuple):
         Longest run, s: what lasts longer is a true jump, dated back to its first fix. No run may
         outlast the track that it contradicts.
     manoeuvre
-        Probability that the vehicle changes its velocity at once.
+        Probability that the highest rate of the model changes at once.
     velocity, again
         Probability that a velocity is wrong, and that it is if the last one was.
     spread

@@ -17,6 +17,7 @@ __all__ = [
     "forget",
     "open_run",
     "predict_axis",
+    "reach",
     "update_axis",
 ]
 
@@ -135,12 +136,19 @@ def update_axis(
 
 
 @helper
-def change_rate(P: FloatArray, gap: float, speed: float) -> None:
-    """Let the velocity have changed at once by 0 ± ``speed``, ``gap`` seconds ago."""
-    P[0, 0] += gap * gap * speed * speed
-    P[0, 1] += gap * speed * speed
-    P[1, 0] = P[0, 1]
-    P[1, 1] += speed * speed
+def reach(order: int, c: int, gap: float) -> float:
+    """How far component c is moved in ``gap`` seconds by a unit of the highest rate."""
+    if c == order - 1:
+        return 1.0
+    return gap if c == order - 2 else 0.5 * gap * gap
+
+
+@helper
+def change_rate(P: FloatArray, order: int, gap: float, sigma: float) -> None:
+    """Let the highest rate have changed at once by 0 ± ``sigma``, ``gap`` seconds ago."""
+    for i in range(order):
+        for j in range(order):
+            P[i, j] += reach(order, i, gap) * reach(order, j, gap) * sigma * sigma
 
 
 @helper

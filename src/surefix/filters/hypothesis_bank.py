@@ -26,6 +26,7 @@ from surefix.filters.hypothesis_axis import (
     commit,
     forget,
     open_run,
+    reach,
     update_axis,
 )
 from surefix.filters.hypothesis_branches import wrapped
@@ -178,7 +179,8 @@ def apply_position(
         nu = wrapped(z[a] - m[0], motion.period)
         if code & MANOEUVRE:
             gap = time - bank.touched[k]
-            change_rate(P, gap, max(speed, HASTE * abs(nu) / gap))
+            rate = abs(nu) / reach(motion.order, 0, gap)
+            change_rate(P, motion.order, gap, max(speed, HASTE * rate))
         if code & POOR:
             update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
         elif code & OPEN:

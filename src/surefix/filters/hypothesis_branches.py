@@ -21,6 +21,7 @@ from surefix.filters.hypotheses import (
     Bank,
     Prior,
 )
+from surefix.filters.hypothesis_axis import reach
 from surefix.filters.records import Motion
 from surefix.jit import helper
 from surefix.types import FloatArray, IntArray
@@ -131,7 +132,8 @@ def velocity_branches(
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
             distance += nu * nu / S
-            free = prior.sigma_velocity * prior.sigma_velocity + S
+            free = prior.sigma_velocity * reach(motion.order, 1, time - bank.touched[k])
+            free = free * free + S
             swift += nu * nu / free
             quick += 0.5 * math.log(free)
             change = nu - bank.slip[k, a]
@@ -219,7 +221,8 @@ def position_branches(
                 inside[a] = log_normal(nu, S)
                 poor += log_normal(nu, S + variance[a] * _POORER)
                 distance += nu * nu / S
-                free = gap * gap * prior.sigma_velocity * prior.sigma_velocity + S
+                free = prior.sigma_velocity * reach(motion.order, 0, gap)
+                free = free * free + S
                 swift += nu * nu / free
                 quick += 0.5 * math.log(free)
                 wide[a] = s2 + S

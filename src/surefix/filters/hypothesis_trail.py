@@ -35,7 +35,7 @@ class Decisions(NamedTuple):
         0 where it does not.
     jump
         (n,) bit mask of the axes whose position jumps before this epoch, and above them of those
-        whose rate does.
+        whose highest rate does.
     run
         (n,) 1 where the fix belongs to a run with a common offset.
     """

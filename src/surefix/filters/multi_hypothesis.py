@@ -30,7 +30,14 @@ from surefix.filters.hypotheses import (
     Prior,
     Trail,
 )
-from surefix.filters.hypothesis_axis import HASTE, change_rate, commit, predict_axis, update_axis
+from surefix.filters.hypothesis_axis import (
+    HASTE,
+    change_rate,
+    commit,
+    predict_axis,
+    reach,
+    update_axis,
+)
 from surefix.filters.hypothesis_bank import (
     apply_position,
     best_of,
@@ -96,7 +103,9 @@ def _apply_velocity(
             m, P = bank.mean[i, a], bank.covariance[i, a]
             nu = z[d + a] - m[1]
             if code & MANOEUVRE:
-                change_rate(P, time - bank.touched[i], max(speed, HASTE * abs(nu)))
+                gap = time - bank.touched[i]
+                rate = abs(nu) / reach(motion.order, 1, gap)
+                change_rate(P, motion.order, gap, max(speed, HASTE * rate))
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
     bank.touched[i] = time
 
@@ -107,7 +116,7 @@ def _displace(motion: Motion, bank: Bank, jump: int) -> None:
     for i in range(bank.number[0]):
         for a in range(motion.axes):
             if (jump >> (motion.axes + a)) & 1:
-                change_rate(bank.covariance[i, a], 0.0, VAGUE_RATE)
+                change_rate(bank.covariance[i, a], motion.order, 0.0, VAGUE_RATE)
             if (jump >> a) & 1:
                 bank.seen[i, a] = False
 

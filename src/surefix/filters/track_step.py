@@ -18,7 +18,7 @@ __all__ = ["RECENT", "VAGUE", "VAGUE_RATE", "predict_factor", "run"]
 VAGUE = 1e6
 """m: standard deviation of a position nothing is known about."""
 VAGUE_RATE = 1e3
-"""m/s: … and of a rate that a decision made beforehand forgets."""
+"""m/s, or m/s²: … and of the change of a rate that was decided beforehand."""
 RECENT = 5
 """Rejected observations remembered for a recovery."""
 _REJECTED = 0.1  # a weight below it counts as a rejection when waiting for a recovery
@@ -64,7 +64,7 @@ def _vague(
 
 @helper
 def _cut(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
-    """Cut positions, or rates, from the past: the noise of what goes on becomes its own.
+    """Cut positions, or the highest rates, from the past; the noise of what goes on is its own.
 
     A rate that is cut has changed by 0 ± `VAGUE_RATE` before the step.
     """
@@ -82,8 +82,10 @@ def _cut(A: FloatArray, motion: Motion, dt: float, mask: int) -> None:
                 B[i, j] = A[c + i * d, n + c + j * d]
             B[i, m] = 0.0
         if turned:
-            B[0, m] = dt * VAGUE_RATE
-            B[1, m] = VAGUE_RATE
+            B[m - 1, m] = VAGUE_RATE
+            B[m - 2, m] = dt * VAGUE_RATE
+            if m == 3:
+                B[0, m] = 0.5 * dt * dt * VAGUE_RATE
         first = 1 if placed else 0
         for i in range(first, m):  # Gram and Schmidt on the rows
             for l in range(first, i):
