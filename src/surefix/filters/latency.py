@@ -1,0 +1,324 @@
+"""How late the positions of one sensor are against the velocities of another.
+
+A fix stamped t that describes the place at t − δ differs from the displacement s by what the
+vehicle travels in δ seconds:
+
+    z_k = c_k + s(t_k − δ) + X_k β + e_k,   e white,   c a random walk
+
+The walk c takes the start, the drift of the integrated noise and, where it starts anew, jumps;
+wrong fixes are left out. X holds what looks a little like a delay and is none: a wrong scale and
+heading of the velocity (columns s and s turned by 90°) and the lateral arm between the sensors
+(the course turned by 90°). δ is found by Gauss–Newton steps over the whitened rows of all axes.
+
+The noise of the velocity must not pass for changes of velocity: its expected part N of the
+information I of the column ṡ is taken off, and the variance of the estimate is I/(I − N)². Where
+N is the larger part the log cannot tell.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.cleaning.hampel import MAD_TO_SIGMA
+from surefix.filters.dead_reckoning import (
+    DeadReckoning,
+    dead_reckoning,
+    displacement,
+    velocity_at,
+    velocity_known,
+)
+from surefix.filters.random_walk import Level, first_level, fit_level, sort_out, whiten
+from surefix.types import BoolArray, FloatArray, IntArray
+
+__all__ = ["UNKNOWN", "Latency", "latency"]
+
+_LEAST = 30  # fixes
+_MOST = 4000  # fixes that are looked at …
+_STRETCH = 250  # … in stretches of so many
+_RANGE = (10.0, 5.0)  # s, and intervals between fixes: the larger is searched either way
+_GRID = 40  # steps of the search either way
+_SPANS = (1, 4, 16)  # fixes between the members of the pairs that the search compares
+_GATE = 4.5  # σ
+_STEPS = 12
+_ENOUGH = 0.02  # standard errors: a smaller step is the last
+_ARM = 3.0  # standard errors from which an arm along the course is believed
+_SLOW = 0.25  # of the usual speed: below it the course says little
+
+
+class Latency(NamedTuple):
+    """A delay of positions against velocities.
+
+    Parameters
+    ----------
+    delay, sigma
+        s, and its standard error. Positive: the positions describe an earlier time than stamped.
+        NaN and infinity where the log cannot tell.
+    arm, arm_sigma
+        m the position lies ahead along the course, and its standard error; an arm within three
+        standard errors is taken as 0 in ``delay``. NaN and infinity where it cannot be told from a
+        delay at all.
+    fixes
+        How many were used.
+    interval
+        Median step between the fixes, s.
+    """
+
+    delay: float
+    sigma: float
+    arm: float
+    arm_sigma: float
+    fixes: int
+    interval: float
+
+
+UNKNOWN = Latency(math.nan, math.inf, math.nan, math.inf, 0, math.nan)
+"""What a log says that cannot tell."""
+
+
+class _Data(NamedTuple):
+    """Fixes of one stretch after the other, and the way against which they are held."""
+
+    time: FloatArray
+    position: FloatArray
+    stretch: IntArray
+    way: DeadReckoning
+    longest: float
+    half: float
+    limit: float
+
+
+class _Fit(NamedTuple):
+    step: float
+    sigma: float
+    arm: float
+    arm_sigma: float
+    nuisance: FloatArray
+    levels: list[Level]
+    used: int
+
+
+def latency(
+    time: FloatArray,
+    position: FloatArray,
+    velocity_time: FloatArray,
+    velocity: FloatArray,
+) -> Latency:
+    """Estimate the delay of positions against velocities.
+
+    Parameters
+    ----------
+    time, position
+        (n,) s, not decreasing; (n, d) m, d = 1 … 3, NaN is missing. Axes are x, y, z in this order;
+        the first two are horizontal. Wrong fixes, also in runs, and jumps may be among them. Of
+        more than 4,000 the stretches with most change of velocity are taken.
+    velocity_time, velocity
+        (m,) s, not decreasing; (m, d) m/s in the same axes, NaN is missing.
+
+    Examples
+    --------
+    >>> rng, t = np.random.default_rng(1), np.arange(400.0)
+    >>> late = 20.0 * np.sin((t - 1.5) / 20.0) + 0.3 * rng.standard_normal(400)
+    >>> speed = np.cos(t / 20.0) + 0.01 * rng.standard_normal(400)
+    >>> found = latency(t, late[:, None], t, speed[:, None])
+    >>> bool(abs(found.delay - 1.5) < 3.0 * found.sigma < 0.2)
+    True
+    """
+    data = _prepare(time, position, velocity_time, velocity)
+    if data is None:
+        return UNKNOWN
+    at = _search(data)
+    nuisance = np.zeros(_columns(data.position.shape[1]))
+    levels: list[Level] = []
+    for _ in range(_STEPS):
+        fit = _fit(data, at, nuisance, levels)
+        if fit is None or abs(at + fit.step) > data.limit:
+            return UNKNOWN
+        at, nuisance, levels = at + fit.step, fit.nuisance, fit.levels
+        if abs(fit.step) < _ENOUGH * fit.sigma:
+            break
+    interval = float(np.median(np.diff(data.time)))
+    return Latency(at, fit.sigma, fit.arm, fit.arm_sigma, fit.used, interval)
+
+
+def _prepare(
+    time: FloatArray, position: FloatArray, velocity_time: FloatArray, velocity: FloatArray
+) -> _Data | None:
+    """Axes that both sensors have, stretches that tell most, and velocity fit to integrate."""
+    moving = np.isfinite(velocity).any(axis=0) & np.isfinite(position).any(axis=0)
+    if not moving.any():
+        return None
+    fixed = np.isfinite(position[:, moving]).all(axis=1) & np.isfinite(time)
+    time, position = time[fixed], position[np.ix_(fixed, moving)]
+    if len(time) < _LEAST or np.isfinite(velocity[:, moving]).all(axis=1).sum() < _LEAST:
+        return None
+    rows, stretch = _chosen(time, velocity_time, velocity[:, moving])
+    time, position = time[rows], position[rows]
+    interval = float(np.median(np.diff(time)))
+    limit = max(_RANGE[0], _RANGE[1] * interval)
+    near = _within(time, stretch, velocity_time, 1.5 * limit)
+    way = dead_reckoning(velocity_time[near], velocity[np.ix_(near, moving)])
+    if len(way.time) < _LEAST:
+        return None
+    half = max(0.25 * interval, 0.5 * way.interval)
+    longest = max(4.0 * way.interval, interval)
+    return _Data(time, position, stretch, way, longest, half, limit)
+
+
+def _chosen(
+    time: FloatArray, velocity_time: FloatArray, velocity: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Rows of the fixes that are looked at, and the stretch each belongs to."""
+    n = len(time)
+    stretches = n // _STRETCH
+    if n <= _MOST:
+        return np.arange(n), np.zeros(n, np.int64)
+    edges = np.searchsorted(velocity_time, time[: stretches * _STRETCH : _STRETCH // 5])
+    medians = np.array(
+        [
+            np.nanmedian(velocity[a:b], axis=0) if np.isfinite(velocity[a:b]).any() else lost
+            for lost in [np.full(velocity.shape[1], np.nan)]
+            for a, b in zip(edges, [*edges[1:], len(velocity)], strict=True)
+        ]
+    ).reshape(stretches, 5, -1)
+    change = np.nansum(np.nan_to_num(np.ptp(medians, axis=1)), axis=1)
+    best = np.sort(np.argsort(-change, kind="stable")[: _MOST // _STRETCH])
+    rows = (best[:, None] * _STRETCH + np.arange(_STRETCH)).ravel()
+    return rows, np.repeat(np.arange(len(best)), _STRETCH)
+
+
+def _within(
+    time: FloatArray, stretch: IntArray, velocity_time: FloatArray, margin: float
+) -> BoolArray:
+    """Velocities that belong to the stretches."""
+    first = np.flatnonzero(np.diff(stretch, prepend=-1))
+    last = np.append(first[1:], len(time)) - 1
+    begin = np.searchsorted(velocity_time, time[first] - margin)
+    end = np.searchsorted(velocity_time, time[last] + margin, side="right")
+    count = np.zeros(len(velocity_time) + 1, np.int64)
+    np.add.at(count, begin, 1)
+    np.add.at(count, end, -1)
+    return np.cumsum(count)[:-1] > 0
+
+
+def _search(data: _Data) -> float:
+    """Delay for which differences of the fixes best follow the displacement."""
+    tried = np.linspace(-data.limit, data.limit, 2 * _GRID + 1)
+    cost = np.zeros(len(tried))
+    scales: dict[tuple[int, int], float] = {}
+    for i in np.argsort(np.abs(tried), kind="stable"):
+        y = data.position - displacement(data.way, data.time - tried[i])
+        for span in _SPANS:
+            apart = y[span:] - y[:-span]
+            for axis in range(y.shape[1]):
+                value = np.abs(apart[:, axis])
+                key = span, axis
+                if key not in scales:
+                    scales[key] = max(MAD_TO_SIGMA * float(np.median(value)), 1e-9)
+                cost[i] += float(np.log1p((value / scales[key]) ** 2).sum())
+    return float(tried[np.argmin(cost)])
+
+
+def _columns(axes: int) -> int:
+    """How many columns beside the delay and the arm along the course there are."""
+    return 3 if axes > 1 else 1
+
+
+def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _Fit | None:
+    """One Gauss–Newton step from a delay."""
+    when = data.time - at
+    known = velocity_known(data.way, when, data.longest)
+    if known.sum() < _LEAST:
+        return None
+    when, stretch = when[known], data.stretch[known]
+    way = displacement(data.way, when)
+    rate = velocity_at(data.way, when, data.half)
+    step = np.diff(when, prepend=when[0])
+    broken = np.diff(stretch, prepend=-1) != 0
+    skipped = np.diff(np.flatnonzero(known), prepend=0) > 1
+    broken |= skipped & (step > data.longest)
+    y = data.position[known] - way
+    course, others = _design(way, rate)
+    rows, levels, spurious, used = [], [], 0.0, 0
+    for axis in range(y.shape[1]):
+        residual = y[:, axis] - others[axis] @ nuisance
+        level = before[axis] if before else first_level(residual, step)
+        for _ in range(1 if before else 4):
+            state = sort_out(residual, step, broken, level, _GATE)
+            level = fit_level(residual, step, state)
+        stacked = np.column_stack([-rate[:, axis], course[:, axis], others[axis], y[:, axis]])
+        white, size, noise = whiten(stacked, step, state, level.ratio)
+        rows.append(white[np.isfinite(size)] / level.sigma)
+        spurious += _velocity_noise(data, axis, level) * float(noise.sum()) / level.sigma**2
+        levels.append(level)
+        used = max(used, int(np.isfinite(size).sum()))
+    return _solve(rows, spurious, levels, used)
+
+
+def _design(way: FloatArray, rate: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+    """Course (n, d), and for every axis the columns (n, c) that a delay is not."""
+    n, d = way.shape
+    if d == 1:
+        return np.zeros((n, 1)), [way]
+    flat = np.hypot(rate[:, 0], rate[:, 1])
+    slow = _SLOW * float(np.median(flat)) + 1e-9
+    course = np.zeros((n, d))
+    course[:, :2] = rate[:, :2] / np.sqrt(flat**2 + slow**2)[:, None]
+    turned = np.zeros((n, d)), np.zeros((n, d))
+    for out, of in zip(turned, (way, course), strict=True):
+        out[:, 0], out[:, 1] = -of[:, 1], of[:, 0]
+    return course, [
+        np.column_stack([way[:, i] * (i < 2), turned[0][:, i], turned[1][:, i]]) for i in range(d)
+    ]
+
+
+def _velocity_noise(data: _Data, axis: int, level: Level) -> float:
+    """Variance of the noise in the mean velocity about a fix, (m/s)².
+
+    White noise of the velocity would make the displacement walk and the velocity rough: the
+    smaller of what either allows.
+    """
+    span = max(2.0 * data.half, 1.5 * data.way.interval)
+    walk = level.ratio * level.sigma**2
+    rough = float(data.way.noise[axis]) ** 2 * data.way.interval
+    return min(walk, rough) / span
+
+
+def _solve(rows: list[FloatArray], spurious: float, levels: list[Level], used: int) -> _Fit | None:
+    """Least squares over the whitened rows; columns are delay, arm, the others and y."""
+    stacked = np.vstack(rows)
+    others, y = stacked[:, 2:-1], stacked[:, -1]
+    scale = np.linalg.norm(others, axis=0)
+    others = others / np.where(scale > 0.0, scale, 1.0)
+    pair = _apart(stacked[:, :2], others)
+    delay, arm = pair[:, 0], pair[:, 1]
+    found = _one(delay, y, spurious)
+    if found is None:
+        return None
+    both = _one(_apart(arm[:, None], delay[:, None])[:, 0], y, 0.0)
+    length, length_sigma = both if both is not None else (math.nan, math.inf)
+    if abs(length) > _ARM * length_sigma:
+        found = _one(_apart(delay[:, None], arm[:, None])[:, 0], y, spurious)
+        if found is None:
+            return None
+    step, sigma = found
+    kept = length if abs(length) > _ARM * length_sigma else 0.0
+    rest = y - step * stacked[:, 0] - kept * stacked[:, 1]
+    nuisance = np.linalg.lstsq(others, rest, rcond=1e-9)[0] / np.where(scale > 0.0, scale, 1.0)
+    return _Fit(step, sigma, length, length_sigma, nuisance, levels, used)
+
+
+def _apart(columns: FloatArray, from_: FloatArray) -> FloatArray:
+    """Columns less what others explain of them."""
+    return np.asarray(columns - from_ @ np.linalg.lstsq(from_, columns, rcond=1e-9)[0])
+
+
+def _one(column: FloatArray, y: FloatArray, spurious: float) -> tuple[float, float] | None:
+    """Coefficient of a column that nothing else explains, and its standard error."""
+    whole = float(column @ column)
+    real = whole - spurious
+    if real <= 0.5 * whole or whole <= 0.0:
+        return None
+    return float(column @ y) / whole, math.sqrt(whole) / real
