@@ -30,7 +30,8 @@ from surefix.filters.dead_reckoning import (
     velocity_at,
     velocity_known,
 )
-from surefix.filters.random_walk import Level, first_level, fit_level, sort_out, whiten
+from surefix.filters.random_walk import USE, Level, first_level, fit_level, sort_out, whiten
+from surefix.robust.loss import block_scale
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["UNKNOWN", "Latency", "latency"]
@@ -41,7 +42,8 @@ _STRETCH = 250  # … in stretches of so many
 _RANGE = (10.0, 5.0)  # s, and intervals between fixes: the larger is searched either way
 _GRID = 40  # steps of the search either way
 _SPANS = (1, 4, 16)  # fixes between the members of the pairs that the search compares
-_GATE = 4.5  # σ
+_GATE, _TAIL = 3.5, 0.0005  # σ of one axis, and its tail
+_SORTED = 8  # times that rows are sorted out before the first step
 _STEPS = 12
 _ENOUGH = 0.02  # standard errors: a smaller step is the last
 _ARM = 3.0  # standard errors from which an arm along the course is believed
@@ -241,20 +243,25 @@ def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _
     broken |= skipped & (step > data.longest)
     y = data.position[known] - way
     course, others = _design(way, rate)
-    rows, levels, spurious, used = [], [], 0.0, 0
-    for axis in range(y.shape[1]):
-        residual = y[:, axis] - others[axis] @ nuisance
-        level = before[axis] if before else first_level(residual, step)
-        for _ in range(1 if before else 4):
-            state = sort_out(residual, step, broken, level, _GATE)
-            level = fit_level(residual, step, state)
-        stacked = np.column_stack([-rate[:, axis], course[:, axis], others[axis], y[:, axis]])
-        white, size, noise = whiten(stacked, step, state, level.ratio)
-        rows.append(white[np.isfinite(size)] / level.sigma)
+    residual = y - np.stack([columns @ nuisance for columns in others], axis=1)
+    levels = before or [first_level(axis, step) for axis in residual.T]
+    stacked = [
+        np.column_stack([-rate[:, i], course[:, i], others[i], y[:, i]]) for i in range(y.shape[1])
+    ]
+    gate = _GATE * block_scale(y.shape[1], _TAIL)
+    for _ in range(1 if before else _SORTED):
+        sigma, ratio = np.array(levels).T
+        state = sort_out(residual, step, broken, sigma, ratio, gate)
+        levels = [fit_level(columns, step, state) for columns in stacked]
+    used = state == USE
+    if used.sum() < _LEAST:
+        return None
+    rows, spurious = [], 0.0
+    for axis, level in enumerate(levels):
+        white, _, noise = whiten(stacked[axis], step, state, level.ratio)
+        rows.append(white[used] / level.sigma)
         spurious += _velocity_noise(data, axis, level) * float(noise.sum()) / level.sigma**2
-        levels.append(level)
-        used = max(used, int(np.isfinite(size).sum()))
-    return _solve(rows, spurious, levels, used)
+    return _solve(rows, spurious, levels, int(used.sum()))
 
 
 def _design(way: FloatArray, rate: FloatArray) -> tuple[FloatArray, list[FloatArray]]:

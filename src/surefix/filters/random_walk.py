@@ -9,23 +9,34 @@ Time Series Models and the Kalman Filter, 1989, 3.4).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from surefix.cleaning.hampel import MAD_TO_SIGMA
 from surefix.jit import kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["RESTART", "SKIP", "USE", "Level", "first_level", "fit_level", "sort_out", "whiten"]
+__all__ = [
+    "RESTART",
+    "SKIP",
+    "USE",
+    "Level",
+    "first_level",
+    "fit_level",
+    "gather",
+    "sort_out",
+    "whiten",
+]
 
 USE, SKIP, RESTART = 0, 1, 2
 """States of a row: used, left out, or the first after which the walk is unknown."""
 
 _RUN = 5  # rows left out on end after which the walk starts anew at the first of them
 _REACH = 16  # rows between the members of the widest pairs the first guess is made of
-_SLOWEST, _FASTEST = -16.0, 5.0  # logarithms of q Δt/σ² that are tried
+_LOGARITHMS = np.arange(-16.0, 5.5, 1.0)  # of q Δt/σ², that are tried
+_RIDGE = 1e-9  # columns that depend on others harm no more than that
 
 
 class Level(NamedTuple):
@@ -51,58 +62,91 @@ def first_level(y: FloatArray, step: FloatArray) -> Level:
     usual = max(float(np.median(step)), 1e-6)
     walk = max(far - near, 0.0) / ((_REACH - 1) * usual)
     white = max(0.5 * (near - walk * usual), 0.05 * near, 1e-12)
-    return Level(float(np.sqrt(white)), max(walk / white, np.exp(_SLOWEST) / usual))
+    return Level(float(np.sqrt(white)), max(walk / white, math.exp(_LOGARITHMS[0]) / usual))
 
 
-def fit_level(residual: FloatArray, step: FloatArray, state: IntArray) -> Level:
-    """Give the likeliest figures of a residual (n,) m whose rows have been sorted out."""
+def fit_level(columns: FloatArray, step: FloatArray, state: IntArray) -> Level:
+    """Give the figures of a series whose rows have been sorted out.
+
+    The likelihood is the restricted one: the freedom that the other columns take is counted. Where
+    the series is short it says little about q, and its maximum is often 0; σ and q are therefore
+    means over the likelihood, log q being anything as likely as anything else at first.
+
+    Parameters
+    ----------
+    columns
+        (n, c) what explains the series, and last the series itself, m.
+    step, state
+        As `whiten`.
+    """
     usual = max(float(np.median(step)), 1e-6)
-    column = residual[:, None]
+    scale = np.abs(columns).max(axis=0)
+    kept = scale > 0.0
+    kept[-1] = True
+    scaled = columns[:, kept] / np.where(scale[kept] > 0.0, scale[kept], 1.0)
+    ratios = np.exp(_LOGARITHMS) / usual
+    cost, variance = np.empty(len(ratios)), np.empty(len(ratios))
+    for i, ratio in enumerate(ratios):
+        gram, logarithms, count = gather(scaled, step, state, ratio)
+        cost[i], variance[i] = _restricted(gram, logarithms, count)
+    share = np.exp(0.5 * (cost.min() - cost))
+    share /= share.sum()
+    unit = max(float(scale[-1]), 1e-300) ** 2
+    white, walk = float(share @ variance), float(share @ (variance * ratios))
+    return Level(math.sqrt(max(white * unit, 1e-24)), walk / max(white, 1e-300))
 
-    def cost(logarithm: float) -> float:
-        rows, size, _ = whiten(column, step, state, float(np.exp(logarithm)) / usual)
-        inner = rows[np.isfinite(size), 0]
-        return float(
-            len(inner) * np.log(max(np.mean(inner**2), 1e-300)) + np.nansum(np.log(size))
-        )
 
-    best = minimize_scalar(
-        cost, bounds=(_SLOWEST, _FASTEST), method="bounded", options={"xatol": 0.05}
-    )
-    ratio = float(np.exp(best.x)) / usual
-    rows, size, _ = whiten(column, step, state, ratio)
-    return Level(float(np.sqrt(max(np.mean(rows[np.isfinite(size)] ** 2), 1e-24))), ratio)
+def _restricted(gram: FloatArray, logarithms: float, count: int) -> tuple[float, float]:
+    """Minus twice the restricted log-likelihood, and the variance σ² that goes with it."""
+    inner = gram[:-1, :-1]
+    size = np.sqrt(np.diag(inner))
+    size = np.where(size > 0.0, size, 1.0)
+    unit = inner / np.outer(size, size) + _RIDGE * np.eye(len(size))
+    right = gram[:-1, -1] / size
+    left = float(gram[-1, -1] - right @ np.linalg.solve(unit, right)) if len(size) else gram[-1, -1]
+    free = max(count - len(size), 1)
+    variance = max(left, 1e-300) / free
+    spread = float(np.linalg.slogdet(unit)[1] + 2.0 * np.log(size).sum())
+    return free * math.log(variance) + logarithms + spread, variance
 
 
 @kernel
 def sort_out(
-    residual: FloatArray, step: FloatArray, broken: BoolArray, level: Level, gate: float
+    residual: FloatArray,
+    step: FloatArray,
+    broken: BoolArray,
+    sigma: FloatArray,
+    ratio: FloatArray,
+    gate: float,
 ) -> IntArray:
-    """Tell which rows are used, left out, or start the walk anew.
+    """Tell which rows are used, left out, or start the walk anew; all axes of a row together.
 
     Parameters
     ----------
     residual, step
-        (n,) m, and s since the row before.
+        (n, d) m, and (n,) s since the row before.
     broken
         (n,) rows before which the walk is unknown.
-    level
-        Figures of the model.
+    sigma, ratio
+        (d,) figures of the model.
     gate
-        Innovations beyond so many standard deviations are left out.
+        Rows whose innovation is longer than so many standard deviations are left out.
     """
-    n = len(residual)
+    n, d = residual.shape
     state = np.zeros(n, np.int64)
-    k, count, mean, p = 0, 0, 0.0, 1.0
+    mean, p = np.zeros(d), np.ones(d)
+    k, count = 0, 0
     while k < n:
         if k == 0 or broken[k] or state[k] == RESTART:
             state[k] = RESTART
-            mean, p, count = residual[k], 1.0, 0
+            mean[:], p[:], count = residual[k], 1.0, 0
             k += 1
             continue
-        p += level.ratio * step[k]
-        innovation = residual[k] - mean
-        if abs(innovation) > gate * level.sigma * np.sqrt(p + 1.0):
+        distance = 0.0
+        for i in range(d):
+            p[i] += ratio[i] * step[k]
+            distance += (residual[k, i] - mean[i]) ** 2 / (sigma[i] ** 2 * (p[i] + 1.0))
+        if distance > gate * gate:
             state[k] = SKIP
             count += 1
             if count == _RUN:
@@ -111,9 +155,10 @@ def sort_out(
                 state[k] = RESTART
                 continue
         else:
-            gain = p / (p + 1.0)
-            mean += gain * innovation
-            p *= 1.0 - gain
+            for i in range(d):
+                gain = p[i] / (p[i] + 1.0)
+                mean[i] += gain * (residual[k, i] - mean[i])
+                p[i] *= 1.0 - gain
             state[k] = USE
             count = 0
         k += 1
@@ -165,3 +210,44 @@ def whiten(
         own = (1.0 - gain) ** 2 * own + gain**2
         p *= 1.0 - gain
     return rows, size, noise
+
+
+@kernel
+def gather(
+    columns: FloatArray, step: FloatArray, state: IntArray, ratio: float
+) -> tuple[FloatArray, float, int]:
+    """Products of the rows that `whiten` makes: their sum (c, c), Σ log of the sizes, and how many.
+
+    Arguments as of `whiten`.
+    """
+    n, c = columns.shape
+    total = np.zeros((c, c))
+    mean, row = np.zeros(c), np.zeros(c)
+    p, product, logarithms, count = 1.0, 1.0, 0.0, 0
+    for k in range(n):
+        if state[k] == RESTART:
+            mean[:] = columns[k]
+            p = 1.0
+            continue
+        p += ratio * step[k]
+        if state[k] == SKIP:
+            continue
+        size = p + 1.0
+        gain = p / size
+        for i in range(c):
+            row[i] = columns[k, i] - mean[i]
+            mean[i] += gain * row[i]
+        for i in range(c):
+            part = row[i] / size
+            for j in range(i + 1):
+                total[i, j] += part * row[j]
+        product *= size
+        if product > 1e200:
+            logarithms += np.log(product)
+            product = 1.0
+        count += 1
+        p *= 1.0 - gain
+    for i in range(c):
+        for j in range(i):
+            total[j, i] = total[i, j]
+    return total, logarithms + np.log(product), count
