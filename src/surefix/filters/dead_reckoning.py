@@ -10,13 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.cleaning.hampel import MAD_TO_SIGMA, hampel
-from surefix.types import BoolArray, FloatArray
+from surefix.cleaning.hampel import MAD_TO_SIGMA
+from surefix.filters.random_walk import RESTART, SKIP, outliers
+from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["DeadReckoning", "dead_reckoning", "displacement", "velocity_at", "velocity_known"]
 
-_WINDOW = 11  # samples a velocity is held against; a run of more than half of them is kept
-_REJECT = 4.0  # robust standard deviations
+_LEAST = 30  # samples that can be judged
+_REJECT = 3.5  # standard deviations of one axis
+_ENDS = 5  # samples that tell where the velocity stands before and after a jump
+_LONGEST_RUN = 60  # samples in a run of wrong velocities
 
 
 class DeadReckoning(NamedTuple):
@@ -57,11 +60,9 @@ def dead_reckoning(time: FloatArray, velocity: FloatArray) -> DeadReckoning:
     ordered = np.concatenate([[True], np.diff(time) > 0.0])
     known = np.isfinite(velocity).all(axis=1) & np.isfinite(time) & ordered
     time, velocity = time[known], velocity[known]
-    good = np.ones(len(time), np.bool_)
-    for axis in velocity.T:
-        scale = _spread(axis)
-        good &= hampel(axis, window=_WINDOW, n_sigma=_REJECT, floor=scale).replaced == 0
-    time, velocity = time[good], velocity[good]
+    if len(time) >= _LEAST:
+        good = _credible(time, velocity)
+        time, velocity = time[good], velocity[good]
     step = np.diff(time)
     mean = 0.5 * (velocity[1:] + velocity[:-1])
     path = np.zeros_like(velocity)
@@ -70,6 +71,28 @@ def dead_reckoning(time: FloatArray, velocity: FloatArray) -> DeadReckoning:
     return DeadReckoning(
         time, velocity, path, float(np.median(step)) if len(step) else np.inf, noise
     )
+
+
+def _credible(time: FloatArray, velocity: FloatArray) -> BoolArray:
+    """(m,) velocities that are neither wild by themselves nor in a run of wrong ones.
+
+    A run begins and ends with a jump, and the velocity after it goes on where it was before.
+    """
+    step = np.diff(time, prepend=time[0])
+    state = outliers(velocity, step, np.zeros(len(time), np.bool_), _REJECT)
+    kept = np.flatnonzero(state != SKIP)
+    first = np.flatnonzero(state[kept] == RESTART)
+    last = np.append(first[1:], len(kept)) - 1
+    begin = np.array([np.median(velocity[kept[i : i + _ENDS]], axis=0) for i in first])
+    end = np.array([np.median(velocity[kept[i - _ENDS + 1 : i + 1]], axis=0) for i in last])
+    good = state != SKIP
+    for i in range(1, len(first) - 1):
+        inward, outward = begin[i] - end[i - 1], begin[i + 1] - end[i]
+        across = begin[i + 1] - end[i - 1]
+        least = min(np.linalg.norm(inward), np.linalg.norm(outward))
+        if last[i] - first[i] < _LONGEST_RUN and np.linalg.norm(across) < 0.5 * least:
+            good[kept[first[i]] : kept[last[i]] + 1] = False
+    return good
 
 
 def displacement(way: DeadReckoning, at: FloatArray) -> FloatArray:
@@ -86,11 +109,11 @@ def velocity_at(way: DeadReckoning, at: FloatArray, half: float) -> FloatArray:
 
 def velocity_known(way: DeadReckoning, at: FloatArray, longest: float) -> BoolArray:
     """(n,) whether a time lies between two samples that are no more than ``longest`` s apart."""
-    index, ahead, step = _place(way, at)
+    _, ahead, step = _place(way, at)
     return (ahead >= 0.0) & (ahead <= step) & (step <= longest)
 
 
-def _place(way: DeadReckoning, at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _place(way: DeadReckoning, at: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     index = np.clip(np.searchsorted(way.time, at, side="right") - 1, 0, len(way.time) - 2)
     return index, at - way.time[index], way.time[index + 1] - way.time[index]
 

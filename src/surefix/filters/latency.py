@@ -30,7 +30,16 @@ from surefix.filters.dead_reckoning import (
     velocity_at,
     velocity_known,
 )
-from surefix.filters.random_walk import USE, Level, first_level, fit_level, sort_out, whiten
+from surefix.filters.random_walk import (
+    RESTART,
+    SKIP,
+    USE,
+    Level,
+    both_ways,
+    first_level,
+    fit_level,
+    whiten,
+)
 from surefix.robust.loss import block_scale
 from surefix.types import BoolArray, FloatArray, IntArray
 
@@ -40,12 +49,14 @@ _LEAST = 30  # fixes
 _MOST = 4000  # fixes that are looked at …
 _STRETCH = 250  # … in stretches of so many
 _RANGE = (10.0, 5.0)  # s, and intervals between fixes: the larger is searched either way
-_GRID = 40  # steps of the search either way
+_GRID = 100  # steps of the search either way
 _SPANS = (1, 4, 16)  # fixes between the members of the pairs that the search compares
 _GATE, _TAIL = 3.5, 0.0005  # σ of one axis, and its tail
 _SORTED = 8  # times that rows are sorted out before the first step
 _STEPS = 12
 _ENOUGH = 0.02  # standard errors: a smaller step is the last
+_PIECE = 10  # rows between breaks that are worth anything
+_BLOCK = 20  # rows whose errors may hang together
 _ARM = 3.0  # standard errors from which an arm along the course is believed
 _SLOW = 0.25  # of the usual speed: below it the course says little
 
@@ -251,8 +262,9 @@ def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _
     gate = _GATE * block_scale(y.shape[1], _TAIL)
     for _ in range(1 if before else _SORTED):
         sigma, ratio = np.array(levels).T
-        state = sort_out(residual, step, broken, sigma, ratio, gate)
+        state = both_ways(residual, step, broken, sigma, ratio, gate)
         levels = [fit_level(columns, step, state) for columns in stacked]
+    state = _long_pieces(state)
     used = state == USE
     if used.sum() < _LEAST:
         return None
@@ -262,6 +274,13 @@ def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _
         rows.append(white[used] / level.sigma)
         spurious += _velocity_noise(data, axis, level) * float(noise.sum()) / level.sigma**2
     return _solve(rows, spurious, levels, int(used.sum()))
+
+
+def _long_pieces(state: IntArray) -> IntArray:
+    """Leave out the rows between breaks that are close to each other: half of them may be wrong."""
+    piece = np.cumsum(state == RESTART)
+    few = np.bincount(piece[state != SKIP], minlength=int(piece[-1]) + 1)[piece] < _PIECE
+    return np.where(few, SKIP, state)
 
 
 def _design(way: FloatArray, rate: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
@@ -328,4 +347,10 @@ def _one(column: FloatArray, y: FloatArray, spurious: float) -> tuple[float, flo
     real = whole - spurious
     if real <= 0.5 * whole or whole <= 0.0:
         return None
-    return float(column @ y) / whole, math.sqrt(whole) / real
+    step = float(column @ y) / whole
+    pull = column * (y - step * column)
+    blocks = np.add.reduceat(pull, np.arange(0, len(pull), _BLOCK))
+    excess = float(blocks @ blocks) / whole
+    if excess < 1.0 + 2.0 * math.sqrt(2.0 / len(blocks)):
+        excess = 1.0
+    return step, math.sqrt(whole * excess) / real

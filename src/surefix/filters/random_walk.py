@@ -16,6 +16,7 @@ import numpy as np
 
 from surefix.cleaning.hampel import MAD_TO_SIGMA
 from surefix.jit import kernel
+from surefix.robust.loss import block_scale
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -34,6 +35,9 @@ USE, SKIP, RESTART = 0, 1, 2
 """States of a row: used, left out, or the first after which the walk is unknown."""
 
 _RUN = 5  # rows left out on end after which the walk starts anew at the first of them
+_SAMPLE = 2000  # rows that the figures of a series are found on
+_SORTED = 4
+_TAIL = 0.0005  # of the gate
 _REACH = 16  # rows between the members of the widest pairs the first guess is made of
 _LOGARITHMS = np.arange(-16.0, 5.5, 1.0)  # of q Δt/σ², that are tried
 _RIDGE = 1e-9  # columns that depend on others harm no more than that
@@ -108,6 +112,50 @@ def _restricted(gram: FloatArray, logarithms: float, count: int) -> tuple[float,
     variance = max(left, 1e-300) / free
     spread = float(np.linalg.slogdet(unit)[1] + 2.0 * np.log(size).sum())
     return free * math.log(variance) + logarithms + spread, variance
+
+
+def both_ways(
+    residual: FloatArray,
+    step: FloatArray,
+    broken: BoolArray,
+    sigma: FloatArray,
+    ratio: FloatArray,
+    gate: float,
+) -> IntArray:
+    """Sort rows out forward and backward in time; what either leaves out is left out.
+
+    One direction alone would keep the beginning of a ramp and leave out its end: the rows kept
+    would tell of a delay that is none. Arguments as of `sort_out`.
+    """
+    forward = sort_out(residual, step, broken, sigma, ratio, gate)
+    back_step = np.append(step[1:], 0.0)[::-1].copy()
+    back_broken = np.append(broken[1:], True)[::-1].copy()
+    backward = sort_out(residual[::-1].copy(), back_step, back_broken, sigma, ratio, gate)[::-1]
+    kept = (forward != SKIP) & (backward != SKIP)
+    breaks = forward == RESTART
+    breaks[1:] |= backward[:-1] == RESTART
+    piece = np.cumsum(breaks)
+    state = np.where(kept, USE, SKIP)
+    piece = piece[kept]
+    state[np.flatnonzero(kept)[np.diff(piece, prepend=-1) != 0]] = RESTART
+    return state
+
+
+def outliers(values: FloatArray, step: FloatArray, broken: BoolArray, gate: float) -> IntArray:
+    """Sort out a series (n, d) of unknown figures, n > 16; the other arguments as of `sort_out`.
+
+    The gate is in standard deviations of one axis.
+    """
+    part = slice(max(len(step) - _SAMPLE, 0) // 2, None)
+    few, apart, cut = values[part][:_SAMPLE], step[part][:_SAMPLE], broken[part][:_SAMPLE]
+    gate *= block_scale(values.shape[1], _TAIL)
+    levels = [first_level(axis, apart) for axis in few.T]
+    for _ in range(_SORTED):
+        sigma, ratio = np.array(levels).T
+        state = both_ways(few, apart, cut, sigma, ratio, gate)
+        levels = [fit_level(axis[:, None], apart, state) for axis in few.T]
+    sigma, ratio = np.array(levels).T
+    return both_ways(values, step, broken, sigma, ratio, gate)
 
 
 @kernel
