@@ -6,6 +6,7 @@ parabola there and its derivative exactly the interpolated velocity.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -83,8 +84,10 @@ def _credible(time: FloatArray, velocity: FloatArray) -> BoolArray:
     kept = np.flatnonzero(state != SKIP)
     first = np.flatnonzero(state[kept] == RESTART)
     last = np.append(first[1:], len(kept)) - 1
-    begin = np.array([np.median(velocity[kept[i : i + _ENDS]], axis=0) for i in first])
-    end = np.array([np.median(velocity[kept[i - _ENDS + 1 : i + 1]], axis=0) for i in last])
+    begin, end = [], []
+    for a, b in zip(first, last + 1, strict=True):
+        begin.append(np.median(velocity[kept[a : min(a + _ENDS, b)]], axis=0))
+        end.append(np.median(velocity[kept[max(b - _ENDS, a) : b]], axis=0))
     good = state != SKIP
     for i in range(1, len(first) - 1):
         inward, outward = begin[i] - end[i - 1], begin[i + 1] - end[i]
@@ -104,13 +107,14 @@ def displacement(way: DeadReckoning, at: FloatArray) -> FloatArray:
 
 def velocity_at(way: DeadReckoning, at: FloatArray, half: float) -> FloatArray:
     """(n, d) m/s: the mean velocity from ``half`` seconds before ``at`` to as long after it."""
-    return (displacement(way, at + half) - displacement(way, at - half)) / (2.0 * half)
+    return np.asarray((displacement(way, at + half) - displacement(way, at - half)) / (2.0 * half))
 
 
 def velocity_known(way: DeadReckoning, at: FloatArray, longest: float) -> BoolArray:
     """(n,) whether a time lies between two samples that are no more than ``longest`` s apart."""
     _, ahead, step = _place(way, at)
-    return (ahead >= 0.0) & (ahead <= step) & (step <= longest)
+    inside: BoolArray = (ahead >= 0.0) & (ahead <= step) & (step <= longest)
+    return inside
 
 
 def _place(way: DeadReckoning, at: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -123,4 +127,4 @@ def _spread(values: FloatArray) -> float:
     if len(values) < 3:
         return 0.0
     second = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-    return MAD_TO_SIGMA * float(np.median(np.abs(second))) / np.sqrt(1.5)
+    return MAD_TO_SIGMA * float(np.median(np.abs(second))) / math.sqrt(1.5)

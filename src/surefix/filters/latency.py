@@ -52,10 +52,12 @@ _RANGE = (10.0, 5.0)  # s, and intervals between fixes: the larger is searched e
 _GRID = 100  # steps of the search either way
 _SPANS = (1, 4, 16)  # fixes between the members of the pairs that the search compares
 _GATE, _TAIL = 3.5, 0.0005  # σ of one axis, and its tail
-_SORTED = 8  # times that rows are sorted out before the first step
+_SORTED = 6  # times that rows are sorted out before the first step
 _STEPS = 12
 _ENOUGH = 0.02  # standard errors: a smaller step is the last
+_NEARLY = 0.3  # … and a larger one, after so many, has come to nothing
 _PIECE = 10  # rows between breaks that are worth anything
+_REAL = 0.6  # share of the information that is not noise, at least
 _BLOCK = 20  # rows whose errors may hang together
 _ARM = 3.0  # standard errors from which an arm along the course is believed
 _SLOW = 0.25  # of the usual speed: below it the course says little
@@ -73,6 +75,8 @@ class Latency(NamedTuple):
         m the position lies ahead along the course, and its standard error; an arm within three
         standard errors is taken as 0 in ``delay``. NaN and infinity where it cannot be told from a
         delay at all.
+    speed
+        Usual speed, m/s: what an arm along the course would have to be for a delay, per second.
     fixes
         How many were used.
     interval
@@ -83,11 +87,12 @@ class Latency(NamedTuple):
     sigma: float
     arm: float
     arm_sigma: float
+    speed: float
     fixes: int
     interval: float
 
 
-UNKNOWN = Latency(math.nan, math.inf, math.nan, math.inf, 0, math.nan)
+UNKNOWN = Latency(math.nan, math.inf, math.nan, math.inf, math.nan, 0, math.nan)
 """What a log says that cannot tell."""
 
 
@@ -142,18 +147,30 @@ def latency(
     data = _prepare(time, position, velocity_time, velocity)
     if data is None:
         return UNKNOWN
-    at = _search(data)
+    at, fit = _settle(data, _search(data), arm=False)
+    if fit is not None and abs(fit.arm) > _ARM * fit.arm_sigma:
+        at, fit = _settle(data, at, arm=True)
+    if fit is None:
+        return UNKNOWN
+    interval = float(np.median(np.diff(data.time)))
+    speed = float(np.median(np.linalg.norm(data.way.velocity, axis=1)))
+    return Latency(at, fit.sigma, fit.arm, fit.arm_sigma, speed, fit.used, interval)
+
+
+def _settle(data: _Data, at: float, *, arm: bool) -> tuple[float, _Fit | None]:
+    """Step from a delay until it stays, without or with an arm along the course; None if never."""
     nuisance = np.zeros(_columns(data.position.shape[1]))
     levels: list[Level] = []
+    fit, last = None, math.inf
     for _ in range(_STEPS):
-        fit = _fit(data, at, nuisance, levels)
+        fit = _fit(data, at, nuisance, levels, arm=arm)
         if fit is None or abs(at + fit.step) > data.limit:
-            return UNKNOWN
+            return at, None
         at, nuisance, levels = at + fit.step, fit.nuisance, fit.levels
-        if abs(fit.step) < _ENOUGH * fit.sigma:
+        last = abs(fit.step) / fit.sigma
+        if last < _ENOUGH:
             break
-    interval = float(np.median(np.diff(data.time)))
-    return Latency(at, fit.sigma, fit.arm, fit.arm_sigma, fit.used, interval)
+    return at, fit if last < _NEARLY else None
 
 
 def _prepare(
@@ -239,7 +256,9 @@ def _columns(axes: int) -> int:
     return 3 if axes > 1 else 1
 
 
-def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _Fit | None:
+def _fit(
+    data: _Data, at: float, nuisance: FloatArray, before: list[Level], *, arm: bool
+) -> _Fit | None:
     """One Gauss–Newton step from a delay."""
     when = data.time - at
     known = velocity_known(data.way, when, data.longest)
@@ -273,7 +292,7 @@ def _fit(data: _Data, at: float, nuisance: FloatArray, before: list[Level]) -> _
         white, _, noise = whiten(stacked[axis], step, state, level.ratio)
         rows.append(white[used] / level.sigma)
         spurious += _velocity_noise(data, axis, level) * float(noise.sum()) / level.sigma**2
-    return _solve(rows, spurious, levels, int(used.sum()))
+    return _solve(rows, spurious, levels, int(used.sum()), arm=arm)
 
 
 def _long_pieces(state: IntArray) -> IntArray:
@@ -312,32 +331,29 @@ def _velocity_noise(data: _Data, axis: int, level: Level) -> float:
     return min(walk, rough) / span
 
 
-def _solve(rows: list[FloatArray], spurious: float, levels: list[Level], used: int) -> _Fit | None:
+def _solve(
+    rows: list[FloatArray], spurious: float, levels: list[Level], used: int, *, arm: bool
+) -> _Fit | None:
     """Least squares over the whitened rows; columns are delay, arm, the others and y."""
     stacked = np.vstack(rows)
     others, y = stacked[:, 2:-1], stacked[:, -1]
     scale = np.linalg.norm(others, axis=0)
-    others = others / np.where(scale > 0.0, scale, 1.0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    others = others / scale
     pair = _apart(stacked[:, :2], others)
-    delay, arm = pair[:, 0], pair[:, 1]
-    found = _one(delay, y, spurious)
+    delay, along = pair[:, :1], pair[:, 1:]
+    found = _one(_apart(delay, along)[:, 0] if arm else delay[:, 0], y, spurious)
     if found is None:
         return None
-    both = _one(_apart(arm[:, None], delay[:, None])[:, 0], y, 0.0)
-    length, length_sigma = both if both is not None else (math.nan, math.inf)
-    if abs(length) > _ARM * length_sigma:
-        found = _one(_apart(delay[:, None], arm[:, None])[:, 0], y, spurious)
-        if found is None:
-            return None
     step, sigma = found
-    kept = length if abs(length) > _ARM * length_sigma else 0.0
-    rest = y - step * stacked[:, 0] - kept * stacked[:, 1]
-    nuisance = np.linalg.lstsq(others, rest, rcond=1e-9)[0] / np.where(scale > 0.0, scale, 1.0)
+    length, length_sigma = _one(_apart(along, delay)[:, 0], y, 0.0) or (math.nan, math.inf)
+    rest = y - step * stacked[:, 0] - (length * stacked[:, 1] if arm else 0.0)
+    nuisance = np.linalg.lstsq(others, rest, rcond=1e-9)[0] / scale
     return _Fit(step, sigma, length, length_sigma, nuisance, levels, used)
 
 
 def _apart(columns: FloatArray, from_: FloatArray) -> FloatArray:
-    """Columns less what others explain of them."""
+    """(n, c) columns less what others (n, o) explain of them."""
     return np.asarray(columns - from_ @ np.linalg.lstsq(from_, columns, rcond=1e-9)[0])
 
 
@@ -345,7 +361,7 @@ def _one(column: FloatArray, y: FloatArray, spurious: float) -> tuple[float, flo
     """Coefficient of a column that nothing else explains, and its standard error."""
     whole = float(column @ column)
     real = whole - spurious
-    if real <= 0.5 * whole or whole <= 0.0:
+    if real <= _REAL * whole or whole <= 0.0:
         return None
     step = float(column @ y) / whole
     pull = column * (y - step * column)

@@ -39,7 +39,7 @@ _SAMPLE = 2000  # rows that the figures of a series are found on
 _SORTED = 4
 _TAIL = 0.0005  # of the gate
 _REACH = 16  # rows between the members of the widest pairs the first guess is made of
-_LOGARITHMS = np.arange(-16.0, 5.5, 1.0)  # of q Δt/σ², that are tried
+_LOGARITHMS = np.arange(-16.0, 5.5, 1.5)  # of q Δt/σ², that are tried
 _RIDGE = 1e-9  # columns that depend on others harm no more than that
 
 
