@@ -88,7 +88,7 @@ def _credible(time: FloatArray, velocity: FloatArray) -> BoolArray:
     for a, b in zip(first, last + 1, strict=True):
         begin.append(np.median(velocity[kept[a : min(a + _ENDS, b)]], axis=0))
         end.append(np.median(velocity[kept[max(b - _ENDS, a) : b]], axis=0))
-    good = state != SKIP
+    good: BoolArray = state != SKIP
     for i in range(1, len(first) - 1):
         inward, outward = begin[i] - end[i - 1], begin[i + 1] - end[i]
         across = begin[i + 1] - end[i - 1]

@@ -113,7 +113,7 @@ class _Fit(NamedTuple):
     sigma: float
     arm: float
     arm_sigma: float
-    nuisance: FloatArray
+    explained: FloatArray
     levels: list[Level]
     used: int
 
@@ -159,14 +159,14 @@ def latency(
 
 def _settle(data: _Data, at: float, *, arm: bool) -> tuple[float, _Fit | None]:
     """Step from a delay until it stays, without or with an arm along the course; None if never."""
-    nuisance = np.zeros(_columns(data.position.shape[1]))
+    explained = np.zeros(_columns(data.position.shape[1]))
     levels: list[Level] = []
     fit, last = None, math.inf
     for _ in range(_STEPS):
-        fit = _fit(data, at, nuisance, levels, arm=arm)
+        fit = _fit(data, at, explained, levels, arm=arm)
         if fit is None or abs(at + fit.step) > data.limit:
             return at, None
-        at, nuisance, levels = at + fit.step, fit.nuisance, fit.levels
+        at, explained, levels = at + fit.step, fit.explained, fit.levels
         last = abs(fit.step) / fit.sigma
         if last < _ENOUGH:
             break
@@ -252,12 +252,12 @@ def _search(data: _Data) -> float:
 
 
 def _columns(axes: int) -> int:
-    """How many columns beside the delay and the arm along the course there are."""
-    return 3 if axes > 1 else 1
+    """How many columns there are: the delay, the arm along the course, and the others."""
+    return 5 if axes > 1 else 3
 
 
 def _fit(
-    data: _Data, at: float, nuisance: FloatArray, before: list[Level], *, arm: bool
+    data: _Data, at: float, explained: FloatArray, before: list[Level], *, arm: bool
 ) -> _Fit | None:
     """One Gauss–Newton step from a delay."""
     when = data.time - at
@@ -273,11 +273,11 @@ def _fit(
     broken |= skipped & (step > data.longest)
     y = data.position[known] - way
     course, others = _design(way, rate)
-    residual = y - np.stack([columns @ nuisance for columns in others], axis=1)
-    levels = before or [first_level(axis, step) for axis in residual.T]
     stacked = [
         np.column_stack([-rate[:, i], course[:, i], others[i], y[:, i]]) for i in range(y.shape[1])
     ]
+    residual = np.stack([each[:, -1] - each[:, :-1] @ explained for each in stacked], axis=1)
+    levels = before or [first_level(axis, step) for axis in residual.T]
     gate = _GATE * block_scale(y.shape[1], _TAIL)
     for _ in range(1 if before else _SORTED):
         sigma, ratio = np.array(levels).T
@@ -337,9 +337,6 @@ def _solve(
     """Least squares over the whitened rows; columns are delay, arm, the others and y."""
     stacked = np.vstack(rows)
     others, y = stacked[:, 2:-1], stacked[:, -1]
-    scale = np.linalg.norm(others, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    others = others / scale
     pair = _apart(stacked[:, :2], others)
     delay, along = pair[:, :1], pair[:, 1:]
     found = _one(_apart(delay, along)[:, 0] if arm else delay[:, 0], y, spurious)
@@ -347,14 +344,23 @@ def _solve(
         return None
     step, sigma = found
     length, length_sigma = _one(_apart(along, delay)[:, 0], y, 0.0) or (math.nan, math.inf)
-    rest = y - step * stacked[:, 0] - (length * stacked[:, 1] if arm else 0.0)
-    nuisance = np.linalg.lstsq(others, rest, rcond=1e-9)[0] / scale
-    return _Fit(step, sigma, length, length_sigma, nuisance, levels, used)
+    explained = _coefficients(stacked[:, :-1], y)
+    explained[0] -= step
+    return _Fit(step, sigma, length, length_sigma, explained, levels, used)
+
+
+def _coefficients(columns: FloatArray, y: FloatArray) -> FloatArray:
+    """Least squares of columns (n, c) of any size."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=1e-9)[0] / scale)
 
 
 def _apart(columns: FloatArray, from_: FloatArray) -> FloatArray:
     """(n, c) columns less what others (n, o) explain of them."""
-    return np.asarray(columns - from_ @ np.linalg.lstsq(from_, columns, rcond=1e-9)[0])
+    scale = np.linalg.norm(from_, axis=0)
+    unit = from_ / np.where(scale > 0.0, scale, 1.0)
+    return np.asarray(columns - unit @ np.linalg.lstsq(unit, columns, rcond=1e-9)[0])
 
 
 def _one(column: FloatArray, y: FloatArray, spurious: float) -> tuple[float, float] | None:

@@ -88,8 +88,8 @@ def _said(sensor: str, reference: str, found: Latency, *, removed: bool) -> str:
     text = f"fixes of {sensor} are {size} ± {sigma} s {_way(found.delay)} against {whose}"
     alike = abs(found.delay) * found.speed
     if not found.arm_sigma < alike / _SURE:
-        side = "behind" if found.delay > 0.0 else "ahead of"
-        text += f", or lie {alike:.2g} m {side} it along the course, which looks alike here"
+        side = "behind" if found.delay > 0.0 else "ahead"
+        text += f", or lie {alike:.2g} m {side} along the course, which looks alike"
     remedy = f"remove with --sensor-delay {sensor}={found.delay:.{digits}f}"
     return text + ("; removed" if removed else f"; {remedy}")
 
