@@ -184,11 +184,11 @@ def test_delay_of_a_sensor_on_the_command_line(tmp_path, monkeypatch):
     write(tmp_path / "dvl.csv", {"time": t, "ve": 2 * np.cos(angle) + noise[0], "vn": noise[1]})
     monkeypatch.chdir(tmp_path)
     words = "usbl.csv", "--velocity", "dvl.csv", "-o", "out.csv"
-    told = clean(*words).stdout
+    told = clean(*words).out
     assert "s late against the velocity of dvl" in told
-    assert "late" not in clean(*words, "--sensor-delay", "usbl=1000ms").stdout
+    assert "late" not in clean(*words, "--sensor-delay", "usbl=1000ms").out
     np.testing.assert_allclose(read(tmp_path / "out.csv").time, t, atol=1e-6)
-    assert "; removed" in clean(*words, "--latency", "remove").stdout
+    assert "; removed" in clean(*words, "--latency", "remove").out
     for wrong in ("usbl", "usbl=", "=1s", "usbl=soon"):
         assert "--sensor-delay" in told_in_one_line(
             surefix("clean", *words, "--sensor-delay", wrong)
