@@ -24,9 +24,11 @@ __all__ = [
     "SKIP",
     "USE",
     "Level",
+    "both_ways",
     "first_level",
     "fit_level",
     "gather",
+    "outliers",
     "sort_out",
     "whiten",
 ]
