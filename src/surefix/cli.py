@@ -127,6 +127,16 @@ def clean(
         str | None,
         typer.Option(metavar="DURATION", help="Write the track at regular times, such as 0.5s."),
     ] = None,
+    latency: Annotated[
+        Literal["report", "remove", "ignore"] | None,
+        typer.Option(help="Fixes that are late against a velocity; default report."),
+    ] = None,
+    sensor_delay: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=DURATION", help="How late the times of a sensor are; repeatable."
+        ),
+    ] = None,
     depth: Depth = None,
     velocity: Velocity = None,
     heading: Heading = None,
@@ -161,7 +171,9 @@ def clean(
             "sigma_velocity": sigma_velocity,
             "process": process,
             "every_s": _seconds("--every", every),
+            "latency": latency,
         },
+        _delays(sensor_delay or []),
     )
     check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
@@ -307,14 +319,30 @@ def _use_utf8() -> None:
             reconfigure(encoding="utf-8", errors="replace")
 
 
-def _options(file: Path | None, given: dict[str, Any]) -> tuple[CleanOptions, dict[str, str]]:
+def _options(
+    file: Path | None, given: dict[str, Any], delays: dict[str, float]
+) -> tuple[CleanOptions, dict[str, str]]:
     """Options of the file, over which those of the command line win, and columns of the file."""
     from surefix.io.options_file import OptionsFile, read_options
     from surefix.pipelines.options import options_from
 
     stored = read_options(file) if file is not None else OptionsFile({}, {})
     words = {name: value for name, value in given.items() if value is not None}
+    if delays:
+        words["sensor_delay_s"] = {**stored.clean.get("sensor_delay_s", {}), **delays}
     return options_from({**stored.clean, **words}), stored.columns
+
+
+def _delays(words: list[str]) -> dict[str, float]:
+    """Read NAME=DURATION."""
+    out = {}
+    for word in words:
+        name, equals, duration = word.rpartition("=")
+        seconds = _seconds("--sensor-delay", duration) if equals else None
+        if not name or seconds is None:
+            raise OptionsError(f"--sensor-delay {word!r}", "NAME=DURATION, such as usbl=1.3s")
+        out[name] = seconds
+    return out
 
 
 def _seconds(option: str, text: str | None) -> float | None:

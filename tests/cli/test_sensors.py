@@ -172,3 +172,24 @@ def test_declared_sigmas_are_believed(tmp_path):
     assert (track.verdict == "rejected").mean() < 0.02
     truth = survey(300, sigma=0.0)["x"]
     assert np.sqrt(np.mean((track.x - truth) ** 2)) < 0.6
+
+
+def test_delay_of_a_sensor_on_the_command_line(tmp_path, monkeypatch):
+    n, rng = 400, np.random.default_rng(5)
+    t = START + np.arange(n)
+    angle = np.arange(n) / 25.0
+    x = 50.0 * np.sin(angle) + rng.normal(0, 0.3, n)
+    write(tmp_path / "usbl.csv", {"time": t + 1.0, "x": x, "y": rng.normal(0, 0.3, n)})
+    noise = rng.normal(0, 0.02, (2, n))
+    write(tmp_path / "dvl.csv", {"time": t, "ve": 2 * np.cos(angle) + noise[0], "vn": noise[1]})
+    monkeypatch.chdir(tmp_path)
+    words = "usbl.csv", "--velocity", "dvl.csv", "-o", "out.csv"
+    told = clean(*words).out
+    assert "s late against the velocity of dvl" in told
+    assert "late" not in clean(*words, "--sensor-delay", "usbl=1000ms").out
+    np.testing.assert_allclose(read(tmp_path / "out.csv").time, t, atol=1e-6)
+    assert "; removed" in clean(*words, "--latency", "remove").out
+    for wrong in ("usbl", "usbl=", "=1s", "usbl=soon"):
+        assert "--sensor-delay" in told_in_one_line(
+            surefix("clean", *words, "--sensor-delay", wrong)
+        )

@@ -33,6 +33,7 @@ from surefix.pipelines.judge import (
     verdicts,
     without_position,
 )
+from surefix.pipelines.latency import Late, find_late, in_time, late_events
 from surefix.pipelines.observe import epochs_of, grid_times, padded, status_of, steady
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.present import nothing, pick, settings, track_of
@@ -213,6 +214,12 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
         head = _head(options)
         setup = settle(take_rows(used, head), (status.verdict < 0)[head], session.sensors, options)
         session.setup = setup
+        delayed = _delayed(session, setup, take_rows(used, head), (status.verdict < 0)[head])
+        removed = bool(delayed) and options.latency == "remove"
+        events += late_events(delayed, removed=removed)
+        if removed:
+            rows = in_time(rows, delayed, session.sensors)
+            return _clean_rows(_without_delay(session, delayed), rows, events)
         if setup.axes:
             session.filter = begin(options, setup.motion, setup.recovery, setup.prior)
         events += [*setup.events, *_idle_events(session)]
@@ -277,6 +284,24 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
         resampled=pick(track, np.flatnonzero(order >= len(tau))) if options.every_s else None,
         settings=settings(options, setup),
     )
+
+
+def _delayed(session: _Session, setup: Setup, rows: Rows, usable: BoolArray) -> tuple[Late, ...]:
+    """Sensors that are late against a velocity, as far as the options ask for it."""
+    if session.options.latency == "ignore":
+        return ()
+    position, velocity = localise(rows, setup.frame, setup.origin)
+    return find_late(rows, usable, position, velocity, session.sensors)
+
+
+def _without_delay(session: _Session, late: tuple[Late, ...]) -> _Session:
+    """Go back to where nothing was settled; the delays are known now."""
+    known = dict(session.options.sensor_delay_s)
+    for each in late:
+        known[each.sensor] = known.get(each.sensor, 0.0) + each.found.delay
+    session.options = replace(session.options, sensor_delay_s=known, latency="ignore")
+    session.setup, session.repeats, session.idle = None, None, None
+    return session
 
 
 def _all_axes(judged: Verdicts, axes: tuple[int, ...]) -> Verdicts:

@@ -13,9 +13,10 @@ from surefix.filters.deciding import AHEAD, THRESHOLDS, Decider
 from surefix.models.motion import MODELS
 from surefix.robust.loss import LOSSES, Loss, loss_named
 
-__all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Mode", "options_from"]
+__all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Latency", "Mode", "options_from"]
 
 Mode = Literal["realtime", "lagged", "offline"]
+Latency = Literal["report", "remove", "ignore"]
 
 MULTI_HYPOTHESIS = "multi-hypothesis"
 _CIPRA_ROMERA = "cipra-romera"
@@ -67,6 +68,9 @@ class CleanOptions:
         Also give the track at regular times, s apart.
     reorder_s
         Rows up to this many seconds out of order are put in their place.
+    latency
+        What is done about fixes that are late against a velocity: ``report`` says so, ``remove``
+        also takes the delay off their times (not in real time), ``ignore`` does not look.
     held
         Count a position that is polled again only once.
     """
@@ -87,12 +91,20 @@ class CleanOptions:
     process: float | None = None
     every_s: float | None = None
     reorder_s: float = 10.0
+    latency: Latency = "report"
     held: bool = True
 
     def __post_init__(self) -> None:
         _one_of("mode", self.mode, get_args(Mode))
         _one_of("method", self.method, METHODS)
         _one_of("model", self.model, (*MODELS, "auto"))
+        _one_of("latency", self.latency, get_args(Latency))
+        if self.latency == "remove" and self.mode == "realtime":
+            raise OptionsError(
+                "latency remove in mode realtime",
+                "mode lagged or offline, which see the log before it is cleaned",
+                "take the delay from surefix info and give it as --sensor-delay NAME=SECONDS",
+            )
         for name in _POSITIVE:
             _positive(name, getattr(self, name))
         for name in ("sensor_sigma", "sensor_delay_s"):
