@@ -16,6 +16,7 @@ from surefix.models.motion import noise_factor, transition
 NAMES = {2: "cv", 3: "ca"}
 POOR = 4.0  # variances of a poor observation
 GROSS = 36.0
+STRANGE = 16.0
 CONFIRMED = 3
 PREFERS = 3.0
 ALIKE = 0.7
@@ -236,17 +237,17 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
         _told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
     gap = time - steps[account.touched] if account.touched >= 0 else 0.0
-    strange = sum(nu[a] ** 2 / S[a] for a in seen) > GROSS
+    strange = sum(nu[a] ** 2 / S[a] for a in seen) > STRANGE
     if not strange or not gap > 0.0 or not prior.manoeuvre > 0.0:
         return out
     far = _reach(motion.order, 1, gap)
-    free = np.array([(far * prior.sigma_velocity) ** 2 + S[a] for a in seen])
+    free = np.array([(far * _agility(motion, a, gap)) ** 2 + S[a] for a in seen])
     gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
     gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
     rows, turns = account.rows, account.turns
     for a in seen:
         rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], r[d + a])))
-        speed = max(prior.sigma_velocity, HASTE * abs(nu[a]) / far)
+        speed = max(_agility(motion, a, gap), HASTE * abs(nu[a]) / far)
         turns = _set(turns, a, (*turns[a], (account.touched, speed)))
     faulty = faulty - {sensor}
     return [
@@ -340,16 +341,16 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         out.append(_told(begun, wild(axes) + np.log(prior.burst), "open"))
     touched = account.touched
     gap = time - steps[touched] if touched >= 0 else 0.0
-    if distance > GROSS and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
+    if distance > STRANGE and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
         far = _reach(motion.order, 0, gap)
         free = np.array(
-            [(far * prior.sigma_velocity) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
+            [(far * _agility(motion, a, gap)) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
         )
         off = {a: _wrap(z[a] - known[a][0][0], period) for a in axes}
         gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
         turns = account.turns
         for a in axes:
-            speed = max(prior.sigma_velocity, HASTE * abs(off[a]) / far)
+            speed = max(_agility(motion, a, gap), HASTE * abs(off[a]) / far)
             turns = _set(turns, a, (*turns[a], (touched, speed)))
         out.append(_told(used(account._replace(turns=turns), axes), gain, "turns"))
     due = [a for a in axes if account.seen[a] and _due(prior, account.lost[a], time)]
@@ -368,6 +369,11 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
 def _reach(order, component, gap):
     """What a unit of the highest rate does to a component in a time."""
     return transition(NAMES[order], 1, gap)[component, order - 1]
+
+
+def _agility(motion, a, gap):
+    """Scale of a change of the highest rate."""
+    return 30.0 * np.sqrt(motion.density[a] * gap)
 
 
 def _due(prior, lost, time):

@@ -6,11 +6,14 @@ A fix that belongs to the track observes p, one of the run observes p + b.
 
 from __future__ import annotations
 
+import math
+
 from surefix.jit import helper
 from surefix.types import FloatArray
 
 __all__ = [
     "HASTE",
+    "agility",
     "begin_anew",
     "change_rate",
     "commit",
@@ -23,6 +26,7 @@ __all__ = [
 
 HASTE = 2.0
 """A rate that is forgotten may be so many times what the next fix says."""
+_SWIFT = 30.0  # standard deviations
 
 
 @helper
@@ -141,6 +145,12 @@ def reach(order: int, c: int, gap: float) -> float:
     if c == order - 1:
         return 1.0
     return gap if c == order - 2 else 0.5 * gap * gap
+
+
+@helper
+def agility(q: float, gap: float) -> float:
+    """Scale of a change of the highest rate: a gross error of what is usual in ``gap`` seconds."""
+    return _SWIFT * math.sqrt(q * gap)
 
 
 @helper

@@ -21,6 +21,7 @@ from surefix.filters.hypotheses import (
 )
 from surefix.filters.hypothesis_axis import (
     HASTE,
+    agility,
     begin_anew,
     change_rate,
     commit,
@@ -180,7 +181,8 @@ def apply_position(
         if code & MANOEUVRE:
             gap = time - bank.touched[k]
             rate = abs(nu) / reach(motion.order, 0, gap)
-            change_rate(P, motion.order, gap, max(speed, HASTE * rate))
+            rate = max(agility(motion.density[a], gap), HASTE * rate)
+            change_rate(P, motion.order, gap, rate)
         if code & POOR:
             update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
         elif code & OPEN:

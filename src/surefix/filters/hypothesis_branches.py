@@ -21,7 +21,7 @@ from surefix.filters.hypotheses import (
     Bank,
     Prior,
 )
-from surefix.filters.hypothesis_axis import reach
+from surefix.filters.hypothesis_axis import agility, reach
 from surefix.filters.records import Motion
 from surefix.jit import helper
 from surefix.types import FloatArray, IntArray
@@ -43,6 +43,7 @@ CONFIRMED = 3
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
+_STRANGE = 16.0  # … and from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew
 _ANEW = 0.1  # … and how probable that is then
@@ -132,7 +133,8 @@ def velocity_branches(
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
             distance += nu * nu / S
-            free = prior.sigma_velocity * reach(motion.order, 1, time - bank.touched[k])
+            gap = time - bank.touched[k]
+            free = agility(motion.density[a], gap) * reach(motion.order, 1, gap)
             free = free * free + S
             swift += nu * nu / free
             quick += 0.5 * math.log(free)
@@ -154,7 +156,7 @@ def velocity_branches(
             score[total] = bank.weight[k] + outside + math.log(out)
             parent[total], code[total] = k, VELOCITY_OUT
             total += 1
-        strange = math.isnan(forced[d]) and distance > _GROSS
+        strange = math.isnan(forced[d]) and distance > _STRANGE
         if strange and time > bank.touched[k] and prior.manoeuvre > 0.0:
             score[total] = bank.weight[k] + log_wild(swift, quick, seen)
             score[total] += math.log(prior.manoeuvre) + math.log1p(-out)
@@ -221,7 +223,7 @@ def position_branches(
                 inside[a] = log_normal(nu, S)
                 poor += log_normal(nu, S + variance[a] * _POORER)
                 distance += nu * nu / S
-                free = prior.sigma_velocity * reach(motion.order, 0, gap)
+                free = agility(motion.density[a], gap) * reach(motion.order, 0, gap)
                 free = free * free + S
                 swift += nu * nu / free
                 quick += 0.5 * math.log(free)
@@ -268,6 +270,7 @@ def position_branches(
             score[total] = base + outside + math.log(prior.burst)
             parent[total], code[total] = k, OPEN
             total += 1
+        strange = distance > _STRANGE and not unknown
         if strange and gap > 0.0 and not own and prior.manoeuvre > 0.0:
             score[total] = base + log_wild(swift, quick, observed) + math.log(prior.manoeuvre)
             parent[total], code[total] = k, MANOEUVRE

@@ -32,6 +32,7 @@ from surefix.filters.hypotheses import (
 )
 from surefix.filters.hypothesis_axis import (
     HASTE,
+    agility,
     change_rate,
     commit,
     predict_axis,
@@ -86,7 +87,6 @@ def _apply_velocity(
     code: int,
     time: float,
     sensor: int,
-    speed: float,
 ) -> None:
     """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
@@ -105,7 +105,8 @@ def _apply_velocity(
             if code & MANOEUVRE:
                 gap = time - bank.touched[i]
                 rate = abs(nu) / reach(motion.order, 1, gap)
-                change_rate(P, motion.order, gap, max(speed, HASTE * rate))
+                rate = max(agility(motion.density[a], gap), HASTE * rate)
+                change_rate(P, motion.order, gap, rate)
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
     bank.touched[i] = time
 
@@ -252,7 +253,7 @@ def _run(
                 if stage == 1:
                     apply_position(motion, two, i, z, r, what, time, sensor, speed)
                 else:
-                    _apply_velocity(motion, two, i, z, r, what, time, sensor, speed)
+                    _apply_velocity(motion, two, i, z, r, what, time, sensor)
             one, two = two, one
             one.number[0] = count
             swaps += 1
