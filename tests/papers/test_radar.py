@@ -131,6 +131,21 @@ def test_the_findings_on_the_page_are_of_this_kind(experiment):
         assert re.sub(r"[\d.]+", "0", ours) == re.sub(r"[\d.]+", "0", theirs)
 
 
+def test_several_hypotheses_survive_runs_of_39(mean):
+    for kind in ("common", "own"):
+        assert mean(f"survived_{kind}_pct", "multi-hypothesis, 20Q0", "39") == 100.0
+
+
+def test_several_hypotheses_come_near_the_filter_told_all_faults(experiment):
+    table = next(each for each in experiment.tables if each.key == "fusion_m")
+    row = {name: table.mean[i] for i, name in enumerate(table.rows)}
+    for ending in ("", ", offline"):
+        ratio = row[f"multi-hypothesis{ending}"] / row[f"one filter, told{ending}"]
+        assert (ratio < 1.06).all()
+        assert ratio.mean() < 1.03
+        assert (row[f"multi-hypothesis{ending}"] < row["oracle"]).all()
+
+
 def test_text_is_complete(experiment):
     text = "\n".join(text_lines(experiment))
     assert "nan" not in text

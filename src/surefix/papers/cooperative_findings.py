@@ -134,13 +134,14 @@ def _ours(tables: Mapping[str, Table]) -> tuple[str, ...]:
     summed = row("ratio", TRACKLETS)
     share = tables["gross_m"].columns[-1]
     return (
-        f"Weights cannot close the gap of fused estimates to the centralised filter: the best there "
+        "Weights cannot close the gap of fused estimates to the centralised filter: the best there "
         f"are, {_BSC}, leave {best.min():.2f} to {best.max():.2f} times where Q is in the truth. "
         f"Sums of what each observation added (tracklets) are {summed.min():.3f} to "
         f"{summed.max():.3f} times the centralised filter in all scenarios.",
-        f"With {share} gross errors the centralised filter with the decisions of several hypotheses "
-        f"errs by {row('gross_ratio', BY_SEVERAL)[-1]:.3f} times as much as one told all gross "
-        f"errors, with thresholds {row('gross_ratio', f'{CENTRAL}, thresholds')[-1]:.3f} times; the "
-        f"multi-hypothesis filter itself {row('gross_ratio', SEVERAL)[-1]:.3f} times in real time "
+        f"With {share} gross errors the centralised filter with the decisions of several "
+        "hypotheses errs by "
+        f"{row('gross_ratio', BY_SEVERAL)[-1]:.3f} times as much as one told all gross "
+        f"errors, with thresholds {row('gross_ratio', f'{CENTRAL}, thresholds')[-1]:.3f} times; "
+        f"the multi-hypothesis filter itself {row('gross_ratio', SEVERAL)[-1]:.3f} times in real time "
         f"and {row('gross_ratio', SMOOTHED)[-1]:.3f} times offline, where it knows the future too.",
     )

@@ -1,9 +1,9 @@
 """The multi-hypothesis filter on what the masters of paper 001 observe.
 
-The masters are the sensors of one filter. The slave's known displacement is subtracted, so that what
-is left walks at random with Q; `surefix.filters.records.Motion` knows constant velocities, and one
-that is observed as nought at every epoch makes a random walk of that: between two such epochs the
-position gains the variance q Δt³/12. The noise is given as to the other filters, at the ranges that
+The masters are the sensors of one filter. The slave's known displacement is subtracted, so that
+what is left walks at random with Q; `surefix.filters.records.Motion` knows constant velocities, and
+one that is observed as nought at every epoch makes a random walk of that: between two such epochs
+the position gains the variance q Δt³/12. The noise is given as to the other filters, at the ranges that
 the filter with thresholds believes; how often and how far observations are wrong is learnt.
 """
 
@@ -62,14 +62,10 @@ def several(
     there = observed_positions(world) - world.path[:, :, None]
     ranges = range_to(believed[:, :, None], world.master.swapaxes(1, 2))
     noise = range_variance(formation.squared_variance, ranges)
-    parts = [
-        _one(world, run, there[run], noise[run], process) for run in range(len(world.truth))
-    ]
+    parts = [_one(world, run, there[run], noise[run], process) for run in range(len(world.truth))]
     stacked = [np.stack(column) for column in zip(*parts, strict=True)]
     diagonal = [each[..., None] * np.eye(3) for each in (stacked[1], stacked[3])]
-    return Several(
-        Estimate(stacked[0], diagonal[0]), Estimate(stacked[2], diagonal[1]), stacked[4]
-    )
+    return Several(Estimate(stacked[0], diagonal[0]), Estimate(stacked[2], diagonal[1]), stacked[4])
 
 
 def _one(

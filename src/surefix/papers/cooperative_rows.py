@@ -199,9 +199,7 @@ def _gross(options: CooperativeOptions, seeds: list[list[int]]) -> dict[str, Row
 def _gross_share(options: CooperativeOptions, seeds: list[list[int]], share: float) -> Rows:
     """RMSE, (runs,) m, by method at one share of gross errors."""
     process = options.process
-    formation = Formation(
-        squared_variance=options.variance, process=process, gross_share=share
-    )
+    formation = Formation(squared_variance=options.variance, process=process, gross_share=share)
     world = stack([simulate(formation, seed) for seed in seeds])
     found: Rows = {}
     for ending, loss in (("", None), (", thresholds", options.threshold_loss)):

@@ -245,7 +245,10 @@ def summed_tracklets(world: Cooperation, tracks: Tracks, process: float) -> Esti
     moved = displacements(world.path, world.time)
     step = np.diff(world.time, prepend=world.time[0])
     before = np.concatenate(
-        (np.broadcast_to(world.guess[:, None, None], tracks.mean[:, :1].shape), tracks.mean[:, :-1]),
+        (
+            np.broadcast_to(world.guess[:, None, None], tracks.mean[:, :1].shape),
+            tracks.mean[:, :-1],
+        ),
         axis=1,
     )
     prior = Estimate(before + moved[:, :, None], tracks.prior)

@@ -221,7 +221,5 @@ def _findings(options: RadarOptions, made: Mapping[str, Table]) -> tuple[str, ..
 
 def _spread(table: Table, ending: str) -> str:
     """Least and greatest ratio of several hypotheses to the same filter told all faults."""
-    ours, told = (
-        table.mean[table.rows.index(name + ending)] for name in (SEVERAL, TOLD_SEVERAL)
-    )
+    ours, told = (table.mean[table.rows.index(name + ending)] for name in (SEVERAL, TOLD_SEVERAL))
     return f"{(ours / told).min():.2f} to {(ours / told).max():.2f}"

@@ -16,6 +16,7 @@ import numpy as np
 from surefix.filters.current_statistical import filter_current
 from surefix.filters.median_recursion import filter_medians, median_recursion
 from surefix.models.singer import singer
+from surefix.papers.radar_hypotheses import filter_several
 from surefix.papers.radar_methods import (
     CURRENT,
     OURS,
@@ -25,7 +26,6 @@ from surefix.papers.radar_methods import (
     cv_names,
     filter_cv,
 )
-from surefix.papers.radar_hypotheses import filter_several
 from surefix.papers.radar_series import Cartesian
 from surefix.types import FloatArray
 
@@ -95,7 +95,9 @@ def burst_methods(density: float, window: int) -> dict[str, Method]:
     found = {name: cv(factor) for name, factor in zip(cv_names(), (1, 9, 20), strict=True)}
     forms = ((PRINTED, "printed"), (REPEATED, "repeated-median"), (OURS, "feedback"))
     medians = {name: _medians(form, window=window) for name, form in forms}
-    return found | {CURRENT: current} | medians | {ROBUST: cv(20, robust=True), SEVERAL_ONE: several}
+    return (
+        found | {CURRENT: current} | medians | {ROBUST: cv(20, robust=True), SEVERAL_ONE: several}
+    )
 
 
 def greatest(

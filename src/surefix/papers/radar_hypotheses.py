@@ -93,9 +93,7 @@ def fuse_several(
     found = {}
     for offline in (False, True):
         ending = ", offline" if offline else ""
-        scaled = both._replace(
-            variance=both.variance * _scales(motion, prior, both, offline)
-        )
+        scaled = both._replace(variance=both.variance * _scales(motion, prior, both, offline))
         for name, epochs in ((SEVERAL, scaled), (TOLD_SEVERAL, told)):
             found[name + ending] = _fusion(_estimate(motion, prior, epochs, offline))
     return found
@@ -135,9 +133,7 @@ def _learnt(epochs: Epochs, density: float) -> tuple[float, Prior]:
     return learnt.figures.process, learnt.prior
 
 
-def _scales(
-    motion: Motion, prior: Prior, epochs: Epochs, centred: bool
-) -> FloatArray:
+def _scales(motion: Motion, prior: Prior, epochs: Epochs, centred: bool) -> FloatArray:
     """(n, 6) squared scale of the innovations of each sensor about, or up to, each epoch."""
     off = np.abs(_estimate(motion, prior, epochs, offline=False).standardised[:, :3])
     scale = np.ones((len(off), 6))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from surefix.experiment import Figure, Panel, Trace
-from surefix.papers.ship_methods import FIGURES_SHOW, METHODS, OURS
+from surefix.papers.ship_methods import FIGURES_SHOW, METHODS, OURS, SEVERAL
 from surefix.papers.ship_run import series
 from surefix.pipelines.ship import Integrated
 from surefix.report.thin import extremes
@@ -57,7 +57,8 @@ def figures(
                   "East velocity, isolated errors (Figure 5 of the paper)"),
         _filtered(alone, "v_north", "north-velocity",
                   "North velocity, isolated errors (Figure 6 of the paper)"),
-        _filtered(log, "v_east", "east-velocity-bursts", "East velocity, with bursts", OURS),
+        _filtered(log, "v_east", "east-velocity-bursts", "East velocity, with bursts",
+                  OURS, SEVERAL),
         _bursts(removed),
         _record(log, record),
     )  # fmt: skip
@@ -132,7 +133,7 @@ def _bursts(removed: Mapping[str, list[float]]) -> Figure:
         )
         for title, names in (
             ("methods that the paper names", (*FIGURES_SHOW, "Lagrange, 3 points")),
-            ("others", ("Hampel, 61 samples", OURS)),
+            ("others", ("Hampel, 61 samples", OURS, SEVERAL)),
         )
     )
     title = "Gross errors removed, by length of burst"

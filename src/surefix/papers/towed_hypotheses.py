@@ -32,7 +32,7 @@ __all__ = ["smooth_several"]
 
 _LONGEST_S: Final = 39.5
 _REST: Final = 1e-3  # σ of the velocity nought, of what the process adds in a step
-_SWEEPS: Final = 4
+_SWEEPS: Final = 2
 _LEAST: Final = 1e-10  # weight of what is wrong
 _WRONG: Final = (2.0, 50.0)  # prior counts: wrong, and all
 _WILD: Final = (30.0, 5.0)  # scale of the wrong ones in σ: where few are known, and at least
@@ -78,9 +78,7 @@ def _decided(survey: TowedSurvey) -> FloatArray:
     return np.where(np.isfinite(weight), weight, 1.0)
 
 
-def _walk(
-    time: FloatArray, x: FloatArray, sigma: float, density: float, period: float
-) -> Decided:
+def _walk(time: FloatArray, x: FloatArray, sigma: float, density: float, period: float) -> Decided:
     """Decide on a random walk of the given variance per second."""
     step = float(np.median(np.diff(time)))
     process = np.sqrt(12.0 * density) / step
