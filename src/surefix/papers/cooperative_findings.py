@@ -142,6 +142,7 @@ def _ours(tables: Mapping[str, Table]) -> tuple[str, ...]:
         "hypotheses errs by "
         f"{row('gross_ratio', BY_SEVERAL)[-1]:.3f} times as much as one told all gross "
         f"errors, with thresholds {row('gross_ratio', f'{CENTRAL}, thresholds')[-1]:.3f} times; "
-        f"the multi-hypothesis filter itself {row('gross_ratio', SEVERAL)[-1]:.3f} times in real time "
-        f"and {row('gross_ratio', SMOOTHED)[-1]:.3f} times offline, where it knows the future too.",
+        f"the multi-hypothesis filter itself {row('gross_ratio', SEVERAL)[-1]:.3f} times in real "
+        f"time and {row('gross_ratio', SMOOTHED)[-1]:.3f} times offline, where it knows the future "
+        "too.",
     )

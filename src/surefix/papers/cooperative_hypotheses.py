@@ -3,8 +3,8 @@
 The masters are the sensors of one filter. The slave's known displacement is subtracted, so that
 what is left walks at random with Q; `surefix.filters.records.Motion` knows constant velocities, and
 one that is observed as nought at every epoch makes a random walk of that: between two such epochs
-the position gains the variance q Δt³/12. The noise is given as to the other filters, at the ranges that
-the filter with thresholds believes; how often and how far observations are wrong is learnt.
+the position gains the variance q Δt³/12. The noise is given as to the other filters, at the ranges
+that the filter with thresholds believes; how often and how far observations are wrong is learnt.
 """
 
 from __future__ import annotations

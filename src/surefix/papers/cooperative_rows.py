@@ -182,10 +182,12 @@ def _readings(options: CooperativeOptions, seeds: list[list[int]]) -> Rows:
     return rows
 
 
-def _gross(options: CooperativeOptions, seeds: list[list[int]]) -> dict[str, Rows]:
+def _gross(
+    options: CooperativeOptions, seeds: list[list[int]], shares: Sequence[float] = GROSS
+) -> dict[str, Rows]:
     """RMSE in m with and without a defence, and its ratio to one filter told all gross errors."""
     found: dict[str, list[FloatArray]] = {}
-    for share in GROSS:
+    for share in shares:
         for name, value in _gross_share(options, seeds, share).items():
             found.setdefault(name, []).append(value)
     metres = {name: np.column_stack(values) for name, values in found.items()}
