@@ -19,7 +19,7 @@ EDITORS = [name for name in METHODS if name not in ("five-point cubic", "weighte
 
 @pytest.fixture(scope="module")
 def experiment():
-    return run(ShipPaperOptions(seed=3, runs=4, hours=2.0))
+    return run(ShipPaperOptions(seed=3, runs=3, hours=2.0))
 
 
 @pytest.fixture(scope="module")

@@ -92,7 +92,7 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> 
         panels += [
             Panel(
                 title=name, x_label="time, h", y_label=label,
-                traces=(thinned(name, hours, cleaned, points=500),),
+                traces=(thinned(name, hours, cleaned, points=380),),
             ),
             Panel(
                 title="a stretch of it",
