@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from docs.pages import ROOT, blocks
+from docs.recorded import assert_shows
 from surefix.errors import OptionsError
+from surefix.papers import cooperative_rows
 from surefix.papers.cooperative import CooperativeOptions, run
+from surefix.papers.cooperative_rows import BY_SEVERAL, SEVERAL, SMOOTHED
 from surefix.papers.reproduce import contents, reproduce, text_lines
 
+PAGE = ROOT / "docs" / "papers" / "cooperative.md"
 NOISE = slice(3, 6)  # columns of the scenarios where the model is right
 
 
@@ -85,6 +90,35 @@ def test_thresholds_keep_gross_errors_out(mean):
     assert kept[0] < 1.1 * mean("gross_m", "gain weights")[0]
 
 
+def test_tracklets_are_the_centralised_filter(mean):
+    """Weights leave a gap where Q is in the truth; what each observation added leaves none."""
+    assert mean("ratio", "tracklets").max() < 1.05
+    assert mean("ratio", "tracklets")[NOISE].max() < 1.02
+    assert (mean("ratio", "tracklets")[NOISE] < mean("ratio", "Bar-Shalom–Campo")[NOISE]).all()
+    assert mean("nees", "tracklets")[NOISE] == pytest.approx(np.ones(3), abs=0.17)
+    assert mean("axes", "tracklets").max() < 1.03
+
+
+def near_the_told(ratio, bound):
+    for name in (BY_SEVERAL, SEVERAL):
+        assert (ratio(name) < bound).all(), name
+    assert (ratio(SMOOTHED) < 0.9).all()
+
+
+def test_several_hypotheses_come_near_a_filter_told_all_gross_errors(mean):
+    near_the_told(lambda name: mean("gross_ratio", name), 1.04)
+    thresholds = mean("gross_ratio", "centralised filter, thresholds")
+    assert mean("gross_ratio", BY_SEVERAL)[-1] < thresholds[-1]
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_so_they_do_on_other_seeds(seed):
+    rows = cooperative_rows._gross(
+        CooperativeOptions(seed=seed), [[seed, i] for i in range(4)], (0.0, 0.1)
+    )["gross_ratio"]
+    near_the_told(lambda name: rows[name].mean(axis=0), 1.06)
+
+
 def test_late_messages(mean):
     replay = mean("late_ratio", "replay of observations")
     assert replay[0] == pytest.approx(1.0, abs=0.01)
@@ -122,6 +156,11 @@ def test_first_run_does_not_depend_on_how_many_there_are(experiment):
     for one, other in zip(alone.tables, experiment.tables, strict=True):
         assert one.values[0] == pytest.approx(other.values[0], rel=1e-9, abs=1e-9, nan_ok=True)
     assert all("nan" not in line for line in alone.findings)
+
+
+def test_the_page_shows_what_is_found(experiment):
+    (shown,) = (block.text for block in blocks(PAGE) if block.info == "recorded")
+    assert_shows(shown, experiment)
 
 
 @pytest.mark.parametrize(

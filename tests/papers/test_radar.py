@@ -106,7 +106,7 @@ def test_figures_stand_beside_the_papers(experiment):
     for figure in experiment.figures:
         for panel in figure.panels:
             assert all(len(trace.x) == len(trace.y) for trace in panel.traces)
-    assert len(experiment.figures[0].panels) == 8
+    assert len(experiment.figures[0].panels) == 9
 
 
 def test_the_page_shows_what_is_found(experiment):
@@ -129,6 +129,22 @@ def test_the_findings_on_the_page_are_of_this_kind(experiment):
     found = shown.strip().splitlines()[-len(experiment.findings) :]
     for ours, theirs in zip(experiment.findings, found, strict=True):
         assert re.sub(r"[\d.]+", "0", ours) == re.sub(r"[\d.]+", "0", theirs)
+
+
+def test_several_hypotheses_survive_runs_of_39(mean):
+    for kind in ("common", "own"):
+        assert mean(f"survived_{kind}_pct", "multi-hypothesis, 20Q0", "39") == 100.0
+
+
+def test_several_hypotheses_come_near_the_filter_told_all_faults(experiment):
+    table = next(each for each in experiment.tables if each.key == "fusion_m")
+    row = {name: table.mean[i] for i, name in enumerate(table.rows)}
+    for ending in ("", ", offline"):
+        ratio = row[f"multi-hypothesis{ending}"] / row[f"one filter, told{ending}"]
+        assert (ratio[[0, 2, 3]] < 1.06).all()
+        assert ratio[1] < 1.25  # 93 samples a run
+        assert ratio.mean() < 1.05
+        assert (row[f"multi-hypothesis{ending}"] < row["oracle"]).all()
 
 
 def test_text_is_complete(experiment):

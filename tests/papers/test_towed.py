@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
+from docs.pages import ROOT, blocks
+from docs.recorded import assert_shows
 from surefix.errors import OptionsError
-from surefix.papers.towed import TowedOptions, run
+from surefix.papers.towed import SEVERAL, TowedOptions, run
+from surefix.papers.towed_methods import estimate, estimate_several, position_rmse, state_rmse
+from surefix.simulate.towed import simulate
+
+PAGE = ROOT / "docs" / "papers" / "towed.md"
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +57,27 @@ def test_smoothing_mends_the_dives(small):
     assert smoothed < 0.6 * real
 
 
+@pytest.mark.parametrize("seed", [30, 60])
+def test_several_hypotheses_come_near_the_smoothed_oracle(seed):
+    ratio = []
+    for i in range(seed, seed + 6):
+        survey = simulate(i, minutes=12.0)
+        best, ours = estimate(survey, "oracle", smooth=True), estimate_several(survey)
+        place = [position_rmse(each, survey.surfaced) for each in (ours, best)]
+        ratio.append([*(state_rmse(ours) / state_rmse(best))[4:], place[0] / place[1]])
+    assert (np.mean(ratio, axis=0) < 1.05).all()
+
+
+def test_several_hypotheses_lose_nothing_without_gross_errors(small):
+    for key in ("position_ratio", "heading_ratio"):
+        assert figure(small, key, SEVERAL) == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_page_shows_what_is_found():
+    (shown,) = (block.text for block in blocks(PAGE) if block.info == "recorded")
+    assert_shows(shown, run(TowedOptions(runs=2)))
+
+
 def test_the_first_run_does_not_depend_on_the_number_of_runs(small):
     one = run(TowedOptions(seed=4, runs=1, minutes=9.0))
     for alone, among in zip(one.tables, small.tables, strict=True):
@@ -69,7 +96,7 @@ def test_figures_are_complete_and_finite(small):
         for trace in panel.traces:
             assert len(trace.x) == len(trace.y)
             assert np.isfinite(trace.y).any(), trace.name
-    assert len(small.findings) == 6
+    assert len(small.findings) == 7
     assert not any("nan" in finding for finding in small.findings)
 
 

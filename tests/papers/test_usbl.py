@@ -41,6 +41,8 @@ def test_the_order_and_the_sizes_of_table_1_hold_on_every_seed(seed, kind):
         assert (error[row] < 0.2 * error["Huber"]).all()
     assert (error["KF"] < error["raw fixes"]).all()
     assert error["surefix, offline"].mean() < 0.5 * error["IGG3"].mean()
+    assert error["multi-hypothesis, offline"].mean() < 1.02 * error["oracle, offline"].mean()
+    assert (rejected(track, found["multi-hypothesis, offline"].position) >= 99.0).all()
     assert error["surefix, real time"].mean() < 1.1 * error["oracle, sensor noise"].mean()
 
 

@@ -33,7 +33,14 @@ BEGUN: Final = 20
 PARTS: Final = 10
 """Into how many parts the fixes are dealt; one of them at a time is left out."""
 
-_JUDGED: Final = (Reason.AGREES, Reason.OFF, Reason.AXIS_OFF, Reason.JUMP, Reason.RUN)
+_JUDGED: Final = (
+    Reason.AGREES,
+    Reason.OFF,
+    Reason.ISOLATED,
+    Reason.AXIS_OFF,
+    Reason.JUMP,
+    Reason.RUN,
+)
 
 
 @dataclass(frozen=True)

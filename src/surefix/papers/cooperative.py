@@ -142,7 +142,15 @@ def _tables(options: CooperativeOptions, rows: dict[str, Rows]) -> tuple[Table, 
             unit="m",
             digits=2,
             note="Case 1, noise; thresholds: full weight up to "
-            f"{options.thresholds[0]:g} σ, prediction only beyond {options.thresholds[1]:g} σ.",
+            f"{options.thresholds[0]:g} σ, prediction only beyond {options.thresholds[1]:g} σ. "
+            "Centralised filter, multi-hypothesis: with its weights, decided offline.",
+        ),
+        _table(
+            "gross_ratio",
+            "The same ÷ one filter told all gross errors",
+            tuple(f"{share:.0%}" for share in GROSS),
+            rows,
+            note="Offline is a smoother: it knows the future too.",
         ),
         _table(
             "late_ratio",

@@ -173,11 +173,12 @@ def _coordinates(sailed: Sailed) -> Figure:
 def _limits(axes: Table, gross: Table) -> Figure:
     apart = tuple(
         Trace(name, np.array(AXES), _row(axes, name), "points")
-        for name in (GAIN, "covariance intersection", "Bar-Shalom–Campo")
+        for name in (GAIN, "covariance intersection", "Bar-Shalom–Campo", "tracklets")
     )
     share = 100.0 * np.array(GROSS)
     wild = tuple(
-        Trace(name, share, _row(gross, name), "points") for name in (GAIN, f"{GAIN}, thresholds")
+        Trace(name, share, _row(gross, name), "points")
+        for name in (GAIN, f"{GAIN}, thresholds", "multi-hypothesis")
     )
     panels = (
         Panel(
@@ -193,7 +194,7 @@ def _limits(axes: Table, gross: Table) -> Figure:
             traces=wild,
         ),
     )
-    title = "Where the gain weights fail, and what thresholds mend"
+    title = "Where the gain weights fail, and what mends it"
     return Figure(key="limits", title=title, panels=panels, columns=2)
 
 

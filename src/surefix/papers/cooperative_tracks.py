@@ -21,6 +21,7 @@ from surefix.fusion.track import (
     joint_update,
     weighted_mean,
 )
+from surefix.fusion.tracklets import Tracklet, tracklet, use_tracklets
 from surefix.geo.rotation import attitude_along, body_to_earth
 from surefix.models.auv import position_rate
 from surefix.models.ranging import (
@@ -38,6 +39,7 @@ __all__ = [
     "CENTRAL",
     "FUSIONS",
     "GAIN",
+    "TRACKLETS",
     "Sailed",
     "Tracks",
     "central_track",
@@ -46,11 +48,13 @@ __all__ = [
     "observe",
     "observed_positions",
     "sail",
+    "summed_tracklets",
     "variances",
 ]
 
 GAIN = "gain weights"
 CENTRAL = "centralised filter"
+TRACKLETS = "tracklets"
 FUSIONS = (
     "mean of observations",
     "mean of estimates",
@@ -59,8 +63,11 @@ FUSIONS = (
     "inverse covariance",
     "covariance intersection",
     "Bar-Shalom–Campo",
+    TRACKLETS,
     CENTRAL,
 )
+
+_NO_WEIGHT = 1e-12
 
 
 class Tracks(NamedTuple):
@@ -190,9 +197,23 @@ def _fed_back(
 
 
 def central_track(
-    formation: Formation, world: Cooperation, process: float, *, loss: Loss | None = None
+    formation: Formation,
+    world: Cooperation,
+    process: float,
+    *,
+    loss: Loss | None = None,
+    weight: FloatArray | None = None,
 ) -> Estimate:
-    """One filter that gets the observations of all masters at once, (runs, K, …): the standard."""
+    """One filter that gets the observations of all masters at once, (runs, K, …): the standard.
+
+    Parameters
+    ----------
+    formation, world, process, loss
+        As for `local_tracks`.
+    weight
+        (runs, masters, K) of each observation, decided beforehand: its variance is divided by it.
+        None for all 1.
+    """
     runs, K = len(world.truth), len(world.time)
     step = np.diff(world.time, prepend=world.time[0])
     moved = displacements(world.path, world.time)
@@ -202,7 +223,10 @@ def central_track(
         shift = moved[:, k, None, :]
         x = predict(x, lambda p, by=shift: p + by, process * step[k] * np.eye(3))  # type: ignore[misc]
         place, turn = world.master[:, None, :, k], world.attitude[:, None, :, k]
-        R = variances(formation, x.mean[:, None], world.master[:, :, k]).reshape(runs, -1)
+        R = variances(formation, x.mean[:, None], world.master[:, :, k])
+        if weight is not None:
+            R = R / np.maximum(weight[:, :, k, None], _NO_WEIGHT)
+        R = R.reshape(runs, -1)
 
         def all_of_them(
             points: FloatArray, place: FloatArray = place, turn: FloatArray = turn
@@ -213,6 +237,28 @@ def central_track(
         z = world.observed[:, :, k].reshape(runs, -1)
         x, _ = update(x, z, all_of_them, R[..., None] * np.eye(R.shape[-1]), loss=loss)
         out.append((x.mean, x.factor @ x.factor.mT))
+    return Estimate(*(np.stack(column, axis=1) for column in zip(*out, strict=True)))
+
+
+def summed_tracklets(world: Cooperation, tracks: Tracks, process: float) -> Estimate:
+    """One filter that adds up what each master's observation added, (runs, K, …)."""
+    moved = displacements(world.path, world.time)
+    step = np.diff(world.time, prepend=world.time[0])
+    before = np.concatenate(
+        (
+            np.broadcast_to(world.guess[:, None, None], tracks.mean[:, :1].shape),
+            tracks.mean[:, :-1],
+        ),
+        axis=1,
+    )
+    prior = Estimate(before + moved[:, :, None], tracks.prior)
+    added = tracklet(prior, Estimate(tracks.mean, tracks.posterior))
+    x = Estimate(world.guess, START_SIGMA**2 * np.eye(3))
+    out = []
+    for k in range(len(world.time)):
+        x = Estimate(x.mean + moved[:, k], x.covariance + process * step[k] * np.eye(3))
+        x = use_tracklets(x, Tracklet(added.information[:, k], added.vector[:, k]))
+        out.append(x)
     return Estimate(*(np.stack(column, axis=1) for column in zip(*out, strict=True)))
 
 
@@ -244,6 +290,7 @@ def sail(
         "inverse covariance": inverse_covariance(mean, posterior),
         "covariance intersection": covariance_intersection(mean, posterior)[0],
         "Bar-Shalom–Campo": bar_shalom_campo(mean, posterior, joint),
+        TRACKLETS: summed_tracklets(world, tracks, process),
         CENTRAL: central_track(formation, world, process, loss=loss),
     }
     if formation.reading == "position":

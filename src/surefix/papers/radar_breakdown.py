@@ -16,15 +16,17 @@ import numpy as np
 from surefix.filters.current_statistical import filter_current
 from surefix.filters.median_recursion import filter_medians, median_recursion
 from surefix.models.singer import singer
+from surefix.papers.radar_hypotheses import filter_several
 from surefix.papers.radar_methods import (
     CURRENT,
     OURS,
     PRINTED,
     ROBUST,
-    Cartesian,
+    SEVERAL_ONE,
     cv_names,
     filter_cv,
 )
+from surefix.papers.radar_series import Cartesian
 from surefix.types import FloatArray
 
 __all__ = [
@@ -78,6 +80,14 @@ def burst_methods(density: float, window: int) -> dict[str, Method]:
 
         return run
 
+    def several(z: FloatArray, banks: Any) -> tuple[Any, FloatArray]:
+        noise = np.full((len(z), 1), _SIGMA**2)
+        done = [
+            filter_several(Cartesian(one[:, None], noise), _DT, 20 * density, bank)
+            for one, bank in zip(z.T, banks or [None] * z.shape[1], strict=True)
+        ]
+        return [each[0] for each in done], np.hstack([each[1] for each in done])
+
     def current(z: FloatArray, state: Any) -> tuple[Any, FloatArray]:
         after, mean, _ = filter_current(model, 10.0, z, _SIGMA**2, state)
         return after, np.ascontiguousarray(mean[..., 0])
@@ -85,7 +95,9 @@ def burst_methods(density: float, window: int) -> dict[str, Method]:
     found = {name: cv(factor) for name, factor in zip(cv_names(), (1, 9, 20), strict=True)}
     forms = ((PRINTED, "printed"), (REPEATED, "repeated-median"), (OURS, "feedback"))
     medians = {name: _medians(form, window=window) for name, form in forms}
-    return found | {CURRENT: current} | medians | {ROBUST: cv(20, robust=True)}
+    return (
+        found | {CURRENT: current} | medians | {ROBUST: cv(20, robust=True), SEVERAL_ONE: several}
+    )
 
 
 def greatest(

@@ -9,16 +9,17 @@ import numpy as np
 
 from surefix.experiment import Figure, Panel, Table, Trace
 from surefix.papers.radar_breakdown import LENGTHS
+from surefix.papers.radar_hypotheses import SEVERAL
 from surefix.papers.radar_methods import (
     BEFORE,
     CURRENT,
     OURS,
     PRINTED,
     ROBUST,
-    Cartesian,
-    Fusion,
+    SEVERAL_ONE,
     cv_names,
 )
+from surefix.papers.radar_series import Cartesian, Fusion
 from surefix.papers.radar_tables import Parts
 from surefix.simulate.radar import RadarFlight
 from surefix.types import FloatArray, IntArray
@@ -78,7 +79,7 @@ def _errors(
         Trace("measured", few.astype(np.float64), error[BEFORE][few], "raw"),
         Trace("wild", wild.astype(np.float64), error[BEFORE][wild], "bad"),
     )
-    after = (*cv_names(), CURRENT, OURS, PRINTED, ROBUST)
+    after = (*cv_names(), CURRENT, OURS, PRINTED, ROBUST, SEVERAL_ONE)
 
     def panel(
         letter: str, title: str, traces: tuple[Trace, ...], shown: tuple[float, float]
@@ -93,7 +94,7 @@ def _errors(
 
     lines = (
         panel(letter, method, (Trace("filtered", at.astype(np.float64), error[method][at]),), near)
-        for letter, method in zip("bcdefgh", after, strict=True)
+        for letter, method in zip("bcdefghi", after, strict=True)
     )
     return Figure(
         key=f"error-{name.lower()}",
@@ -163,6 +164,7 @@ def _fused(
         ("CV Kalman", "CV Kalman, inverse covariance"),
         ("medians by residual scale", "residual scale"),
         ("IGG3 Kalman", "IGG3 Kalman, inverse covariance"),
+        ("multi-hypothesis", SEVERAL),
     )
 
     def off(position: FloatArray, rows: IntArray, axis: int) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from surefix.fusion.residual_scale import fuse_by_scale, noise_gain
 from surefix.fusion.track import inverse_covariance
 from surefix.models.radar import unbiased
 from surefix.models.singer import singer
+from surefix.papers.radar_hypotheses import SEVERAL, filter_several, fuse_several
+from surefix.papers.radar_series import Cartesian, Fusion
 from surefix.robust.loss import loss_named
 from surefix.simulate.radar import RadarFlight, RadarLog
 from surefix.types import FloatArray
@@ -29,10 +31,9 @@ __all__ = [
     "PRINTED",
     "PRINTED_CA",
     "ROBUST",
+    "SEVERAL_ONE",
     "TOLD",
     "TOLD_CV",
-    "Cartesian",
-    "Fusion",
     "cartesian",
     "current_statistical",
     "cv_names",
@@ -50,6 +51,7 @@ OURS: Final = "medians, feedback"
 PRINTED_CA: Final = "medians, printed, acceleration"
 OURS_CA: Final = "medians, feedback, acceleration"
 ROBUST: Final = "IGG3 Kalman, 20Q0"
+SEVERAL_ONE: Final = f"{SEVERAL}, 20Q0"
 TOLD: Final = "oracle"
 TOLD_CV: Final = "CV Kalman, 20Q0, told"
 
@@ -57,36 +59,6 @@ _FACTORS: Final = (1, 9, 20)
 _ALPHA, _HIGHEST = 1.0 / 20.0, 10.0  # 1/s, evasion lasts 10–30 s; m/s²
 _EVERY: Final = 20  # of the samples used for registration without a reference
 _NEVER, _LATER = Recovery(np.inf, 1e3), Recovery(2.5, 1e3)  # 2.5 s are 50 samples
-
-
-class Cartesian(NamedTuple):
-    """A registered radar's measurements in the common frame.
-
-    Parameters
-    ----------
-    position
-        (n, 3) m.
-    variance
-        (n, 3) m², of each axis by the usual noise of the radar.
-    """
-
-    position: FloatArray
-    variance: FloatArray
-
-
-class Fusion(NamedTuple):
-    """What one way to fuse gives.
-
-    Parameters
-    ----------
-    position
-        (n, 3) m.
-    variance
-        (n, 3) m², as claimed; NaN where nothing is claimed.
-    """
-
-    position: FloatArray
-    variance: FloatArray
 
 
 def cv_names() -> tuple[str, ...]:
@@ -192,6 +164,7 @@ def filter_one(
         options = median_recursion(form, model=model, window=window)
         found[name] = filter_medians(options, series.position)[1].estimate
     found[ROBUST] = filter_cv(series, flight.dt, _FACTORS[-1] * density, robust=True)[1]
+    found[SEVERAL_ONE] = filter_several(series, flight.dt, _FACTORS[-1] * density)[1]
     found[TOLD_CV] = filter_cv(_told(flight, series), flight.dt, _FACTORS[-1] * density)[1]
     return found
 
@@ -217,6 +190,7 @@ def fuse_both(
     for robust, name in ((False, "CV Kalman"), (True, "IGG3 Kalman")):
         made = _fused_cv(flight, a, b, density, robust)
         found[f"{name}, inverse covariance"] = made
+    found |= fuse_several(flight, a, b, _FACTORS[-1] * density)
     told = np.array([filter_medians(options, _told(flight, a).position)[1].estimate, positions[1]])
     real = usual * np.array([log.noise[:, None] ** 2 for log in flight.radars])
     best = fuse_by_scale(told, np.sqrt(real))

@@ -21,7 +21,8 @@ from surefix.papers.radar_breakdown import (
     longest,
     settings,
 )
-from surefix.papers.radar_methods import COUNTED, OURS, PRINTED, Cartesian, Fusion
+from surefix.papers.radar_methods import COUNTED, OURS, PRINTED
+from surefix.papers.radar_series import Cartesian, Fusion
 from surefix.simulate.radar import RadarFlight
 from surefix.types import BoolArray, FloatArray
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from surefix.experiment import Figure, Panel, Trace
-from surefix.papers.ship_methods import FIGURES_SHOW, METHODS, OURS
+from surefix.papers.ship_methods import FIGURES_SHOW, METHODS, OURS, PAPER, SEVERAL
 from surefix.papers.ship_run import series
 from surefix.pipelines.ship import Integrated
 from surefix.report.thin import extremes
@@ -57,7 +57,8 @@ def figures(
                   "East velocity, isolated errors (Figure 5 of the paper)"),
         _filtered(alone, "v_north", "north-velocity",
                   "North velocity, isolated errors (Figure 6 of the paper)"),
-        _filtered(log, "v_east", "east-velocity-bursts", "East velocity, with bursts", OURS),
+        _filtered(log, "v_east", "east-velocity-bursts", "East velocity, with bursts",
+                  PAPER, OURS, SEVERAL),
         _bursts(removed),
         _record(log, record),
     )  # fmt: skip
@@ -78,7 +79,7 @@ def _logged(log: ShipLog, key: str, title: str, shown: Mapping[str, str], unit: 
     return Figure(key=key, title=title, panels=tuple(panels), columns=2 if len(panels) == 2 else 1)
 
 
-def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> Figure:
+def _filtered(log: ShipLog, quantity: str, key: str, title: str, *names: str) -> Figure:
     """Raw and filtered, for each method the whole voyage and a stretch with faults of all kinds."""
     sensor, hours = log.sensor("INS", quantity), _hours(log)
     given = series(log, sensor)
@@ -86,7 +87,7 @@ def _filtered(log: ShipLog, quantity: str, key: str, title: str, *more: str) -> 
     near, second = slice(first, last), np.arange(first, last, dtype=np.float64)
     label = f"{'east' if quantity == 'v_east' else 'north'} velocity, m/s"
     panels = []
-    for name in (*FIGURES_SHOW, *more):
+    for name in names or FIGURES_SHOW:
         cleaned = METHODS[name](given).value
         panels += [
             Panel(
@@ -132,7 +133,7 @@ def _bursts(removed: Mapping[str, list[float]]) -> Figure:
         )
         for title, names in (
             ("methods that the paper names", (*FIGURES_SHOW, "Lagrange, 3 points")),
-            ("others", ("Hampel, 61 samples", OURS)),
+            ("others", ("Hampel, 61 samples", OURS, SEVERAL)),
         )
     )
     title = "Gross errors removed, by length of burst"

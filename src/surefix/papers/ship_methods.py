@@ -14,14 +14,25 @@ from surefix.cleaning.least_squares import five_point_cubic, sliding_least_squar
 from surefix.cleaning.plausibility import Bounds, Check, plausibility
 from surefix.cleaning.replacement import Replaced
 from surefix.cleaning.tukey53h import DELAY, tukey53h
+from surefix.papers.ship_hypotheses import edit_by_hypotheses
 from surefix.types import FloatArray
 
-__all__ = ["DELAYS", "FIGURES_SHOW", "METHODS", "OURS", "PAPER", "Series"]
+__all__ = [
+    "DELAYS",
+    "FIGURES_SHOW",
+    "METHODS",
+    "OURS",
+    "PAPER",
+    "SEVERAL",
+    "SMOOTHERS",
+    "Series",
+]
 
 _WINDOW, _LONG, _MARGIN = 11, 61, 2.0
 
 PAPER = "improved 53H (paper)"
 OURS = "rate check + 53H (line)"
+SEVERAL = "multi-hypothesis, offline"
 FIGURES_SHOW = ("weighted least squares", "five-point cubic", PAPER)
 """The three methods of the paper's Figures 5 and 6."""
 
@@ -59,6 +70,9 @@ def _rate_and_53h(series: Series) -> Replaced:
     return cleaned._replace(replaced=cleaned.replaced | refused)
 
 
+SMOOTHERS = ("five-point cubic", "weighted least squares")
+"""Methods that edit every sample."""
+
 METHODS: Mapping[str, Callable[[Series], Replaced]] = MappingProxyType(
     {
         "five-point cubic": lambda s: five_point_cubic(s.value, period=s.period),
@@ -73,11 +87,12 @@ METHODS: Mapping[str, Callable[[Series], Replaced]] = MappingProxyType(
         "Hampel, 11 samples": lambda s: hampel(s.value, window=_WINDOW, period=s.period),
         "Hampel, 61 samples": lambda s: hampel(s.value, window=_LONG, period=s.period),
         OURS: _rate_and_53h,
+        SEVERAL: lambda s: edit_by_hypotheses(*s),
     }
 )
 """By name, in the order of the tables."""
 
-DELAYS: Mapping[str, int] = MappingProxyType(
+DELAYS: Mapping[str, float] = MappingProxyType(
     {
         "five-point cubic": 2,
         "weighted least squares": _WINDOW // 2,
@@ -89,6 +104,7 @@ DELAYS: Mapping[str, int] = MappingProxyType(
         "Hampel, 11 samples": _WINDOW // 2,
         "Hampel, 61 samples": _LONG // 2,
         OURS: DELAY,
+        SEVERAL: np.nan,
     }
 )
-"""Samples after which each decides."""
+"""Samples after which each decides; NaN for one that looks at the whole series."""

@@ -11,7 +11,7 @@ from surefix.cleaning.plausibility import Check
 from surefix.cleaning.replacement import Replaced
 from surefix.cleaning.tukey53h import tukey53h
 from surefix.geo.angle import wrap
-from surefix.papers.ship_methods import METHODS, Series
+from surefix.papers.ship_methods import METHODS, SMOOTHERS, Series
 from surefix.pipelines.ship import Integrated, integrate
 from surefix.pipelines.ship_cleaning import Stream
 from surefix.pipelines.ship_fusion import Quality
@@ -64,6 +64,8 @@ class _Scores(NamedTuple):
     """What one method did to one channel."""
 
     removed: FloatArray  # (6,) share by length of burst
+    found: FloatArray  # (6,) share that was edited, whatever it became
+    false: float  # share of the good samples that was edited
     altered: float
     distortion: float
     error: float
@@ -97,6 +99,14 @@ def editing_rows(log: ShipLog) -> Rows:
         "removed_pct": {
             name: (100.0 * np.nanmean([s.removed for s in each], axis=0)).tolist()
             for name, each in scores.items()
+        },
+        "found_pct": {
+            name: [
+                *(100.0 * np.nanmean([s.found for s in scores[name]], axis=0)).tolist(),
+                1e4 * float(np.max([s.false for s in scores[name]])),
+            ]
+            for name in scores
+            if name not in SMOOTHERS
         },
         "altered_pct": _rows(scores, "altered", 100.0),
         "distortion": _rows(scores, "distortion", 1.0),
@@ -138,9 +148,12 @@ def _score(sensor: ShipSensor, given: Series, cleaned: Replaced) -> _Scores:
         gone = ~(np.abs(error) > given.threshold)  # what was left out is NaN and gone as well
         altered = ~(cleaned.value == given.value)
     removed = np.array([_mean(gone[faults.burst == length]) for length in BURSTS])
+    found = np.array([_mean(cleaned.replaced[faults.burst == length]) for length in BURSTS])
     counted = (faults.good | (faults.burst > 0)) & np.isfinite(error)
     return _Scores(
         removed,
+        found,
+        _mean(cleaned.replaced[faults.good]),
         _mean(altered[faults.good]),
         unit * _rms(error[faults.good & np.isfinite(error)]),
         unit * _rms(error[counted]),

@@ -99,7 +99,7 @@ def _states(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Pan
 
 
 def _errors(survey: TowedSurvey, estimates: Mapping[str, Estimate]) -> tuple[Panel, ...]:
-    names = (*_LINES, "M eqs 19 + RTS", "oracle")
+    names = (*_LINES, "M eqs 19 + RTS", "multi-hypothesis + RTS", "oracle")
     x = survey.time / 60.0
     panels = []
     for label, top, columns in (

@@ -11,6 +11,7 @@ from surefix.filters.towed import TowedTrack, filter_towed, smooth_towed
 from surefix.geo.angle import wrap
 from surefix.metrics import normalised_squares, rmse
 from surefix.models.towed import offset
+from surefix.papers.towed_hypotheses import smooth_several
 from surefix.robust.loss import loss_named
 from surefix.simulate.towed import TowedSurvey
 from surefix.types import BoolArray, FloatArray
@@ -20,6 +21,7 @@ __all__ = [
     "METHODS",
     "Estimate",
     "estimate",
+    "estimate_several",
     "measured_rmse",
     "nees",
     "position_rmse",
@@ -93,6 +95,16 @@ def estimate(
     )
     if smooth:
         track = smooth_towed(track, survey.time, known[0], rates=known[1])
+    return _held(survey, track)
+
+
+def estimate_several(survey: TowedSurvey) -> Estimate:
+    """Smooth one survey by what several hypotheses decide, offline."""
+    return _held(survey, smooth_several(survey))
+
+
+def _held(survey: TowedSurvey, track: TowedTrack) -> Estimate:
+    """Hold a track against the truth."""
     error = track.mean - survey.truth
     error[:, 0], error[:, 1] = offset(*survey.truth[:, :2].T, *track.mean[:, :2].T)
     return Estimate(track, error)

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from surefix.experiment import Figure, Panel, Trace
-from surefix.papers.usbl_methods import Estimate
+from surefix.papers.usbl_methods import SEVERAL, Estimate
 from surefix.simulate.usbl_track import UsblTrack
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["figures"]
 
 _FIRST = ("KF", "Huber", "IGG1", "IGG3")
-_OURS = "surefix, offline"
+_OURS = f"{SEVERAL}, offline"
 _AXES = ("X", "Y", "Z")
 _LABEL = "time, s"
 

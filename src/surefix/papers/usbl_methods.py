@@ -7,6 +7,7 @@ what a residual is divided by.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from surefix.filters.linear import filter_linear
 from surefix.models.motion import noise_factor, transition
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
-from surefix.pipelines.options import CleanOptions, Mode
+from surefix.pipelines.options import MULTI_HYPOTHESIS, CleanOptions, Mode
 from surefix.robust.loss import loss_named
 from surefix.simulate.usbl_track import UsblTrack
 from surefix.types import BoolArray, FloatArray
@@ -25,6 +26,7 @@ __all__ = [
     "METHODS",
     "PROCESS",
     "SENSORS",
+    "SEVERAL",
     "Estimate",
     "Reading",
     "compare",
@@ -70,6 +72,9 @@ class Reading(NamedTuple):
 SENSORS = Reading(None, True, "innovation", 1.5, 4.5)
 """What the sensors and the motion say of Q and R, and the usual constants."""
 
+SEVERAL = MULTI_HYPOTHESIS
+"""Rows of `surefix clean --method multi-hypothesis`."""
+
 
 class Estimate(NamedTuple):
     """(n, 3) positions in m, and their (n, 3, 3) covariance, NaN where a method gives none."""
@@ -86,7 +91,11 @@ def compare(track: UsblTrack, reading: Reading) -> dict[str, Estimate]:
     found["IGG3, sensor noise"] = estimate(track, "IGG3", SENSORS)
     found["surefix, real time"] = _cleaned(track, "realtime")
     found["surefix, offline"] = _cleaned(track, "offline")
+    found[f"{SEVERAL}, real time"] = _cleaned(track, "realtime", SEVERAL)
+    found[f"{SEVERAL}, offline"] = _cleaned(track, "offline", SEVERAL)
     found["oracle, sensor noise"] = estimate(track, "KF", SENSORS, left_out=track.gross)
+    told = replace(track, fixes=np.where(track.gross[:, None], np.nan, track.fixes))
+    found["oracle, offline"] = _cleaned(told, "offline", "kalman")
     return found
 
 
@@ -169,11 +178,12 @@ def _sensor_noise(track: UsblTrack) -> FloatArray:
     return R
 
 
-def _cleaned(track: UsblTrack, mode: Mode) -> Estimate:
+def _cleaned(track: UsblTrack, mode: Mode, method: str = "igg3") -> Estimate:
     """What `surefix clean` makes of the same log, told the same noise figures."""
     variance = np.nanmean(np.diagonal(track.fix_covariance, axis1=1, axis2=2), axis=0)
     options = CleanOptions(
         mode=mode,
+        method=method,
         model="cv",
         sigma_position=float(np.sqrt(variance[:2].mean())),
         sigma_height=float(np.sqrt(variance[2])),
