@@ -89,7 +89,7 @@ def clean(
         ]
         | None,
         typer.Option(
-            help="Several hypotheses, one with a robust loss, or a cleaner before it; default igg3."
+            help="Several hypotheses, one with a robust loss, or a cleaner before it; default multi-hypothesis."
         ),
     ] = None,
     model: Annotated[
