@@ -89,7 +89,7 @@ def clean(
         ]
         | None,
         typer.Option(
-            help="Several hypotheses, one with a robust loss, or a cleaner before it; default multi-hypothesis."
+            help="Several hypotheses (the default), a robust loss, or a cleaner before a plain filter."
         ),
     ] = None,
     model: Annotated[
