@@ -15,15 +15,16 @@ import numpy as np
 
 from surefix.filters.hypothesis_bank import best_of, keep_best
 from surefix.filters.hypothesis_branches import log_normal, log_wild
-from surefix.filters.sight_fit import POORER, finish, fit, innovation, prepare
+from surefix.filters.sight_fit import finish, fit, innovation, prepare
 from surefix.filters.sight_records import (
+    MATURE_SIGHTS,
+    YOUNG_SIGHTS,
     SightBank,
     SightFound,
     SightModel,
     SightPrior,
     Sights,
     SightTrail,
-    empty_bank,
 )
 from surefix.jit import helper, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
@@ -200,10 +201,11 @@ def _alike(bank: SightBank, i: int, j: int) -> bool:
 @helper
 def _thin(model: SightModel, bank: SightBank, origin: IntArray, again: BoolArray) -> None:
     """Drop hypotheses out of bounds, let like ones add up, and close the gaps."""
-    count, left = bank.number[0], 0
-    best = best_of(bank.weight, count)
+    count, left, bounded = bank.number[0], 0, False
     for i in range(count):
-        keep = _inside(model, bank, i) or (i == count - 1 and left == 0)
+        bounded = bounded or _inside(model, bank, i)
+    for i in range(count):
+        keep = not bounded or _inside(model, bank, i)
         for j in range(left):
             if keep and _alike(bank, j, i):
                 keep = False
@@ -275,20 +277,22 @@ def _run(
         dt = 0.0 if math.isnan(time) else sights.time[k] - time
         time = sights.time[k]
         z, r, anchor = sights.z[k], sights.variance[k], sights.anchor[k]
+        kept = most if one.age[0] < YOUNG_SIGHTS else min(most, MATURE_SIGHTS)
         if dt > 0.0:
             for i in range(one.number[0]):
                 predict_sight(one.mean[i], one.covariance[i], model.axes, dt, model.density)
         forced = restarts.shape[0] > 0
+        open_ = not forced and prior.restart > 0.0 and dt > 0.0 and not np.isnan(z).all()
         if forced and restarts[k]:
             _restart(model, prior, one)
             _copy(one, 0, one, one.number[0] - 1)
             one.number[0] = 1
-        elif not forced and prior.restart > 0.0 and dt > 0.0:
+        elif open_:
             _restart(model, prior, one)
         for i in range(one.number[0]):
             prepare(model, one, i, z, anchor)
             origin[i], again[i] = i, False
-        if not forced and prior.restart > 0.0 and dt > 0.0:
+        if open_:
             last = one.number[0] - 1
             again[last] = True
             origin[last] = best_of(one.weight, last)
@@ -306,7 +310,7 @@ def _run(
                 model, prior, one, c, sights, k, score, parent, taken, step, normal, evidence
             )
             before[:], repeated[:] = origin, again
-            count, norm = keep_best(score, total, chosen, two.weight[:most])
+            count, norm = keep_best(score, total, chosen, two.weight[:kept])
             found.evidence[k] += norm
             for i in range(count):
                 p, how = parent[chosen[i]], taken[chosen[i]]
@@ -323,8 +327,7 @@ def _run(
             swaps += 1
         _close(model, prior, one, sights, k)
         _thin(model, one, origin, again)
-        if one.number[0] > most:
-            one.number[0] = most
+        one.age[0] += 1
         _report(one, k, z, found)
         if traced:
             trail.best[k] = best_of(one.weight, one.number[0])
@@ -367,7 +370,8 @@ def filter_sights(
     n, c = sights.z.shape
     most, s = len(bank.weight) - 1, 2 * model.axes
     one = SightBank._make(field.copy() for field in bank)
-    two = SightBank._make(field.copy() for field in bank)._replace(time=one.time, number=one.number)
+    two = SightBank._make(field.copy() for field in bank)
+    two = two._replace(time=one.time, number=one.number, age=one.age)
     found = SightFound(
         np.full((n, s), np.nan),
         np.full((n, s, s), np.nan),
@@ -383,6 +387,6 @@ def filter_sights(
         np.zeros((rows, most), np.bool_),
         np.zeros(rows, np.int64),
     )
-    open_ = np.zeros(0, np.int64)
-    swaps = _run(model, prior, sights, open_ if restarts is None else restarts, one, two, found, trail)
+    known = np.zeros(0, np.int64) if restarts is None else restarts
+    swaps = _run(model, prior, sights, known, one, two, found, trail)
     return (two if swaps % 2 else one), found, trail

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.filters.sight_fit import POORER
 from surefix.filters.sight_hypotheses import filter_sights
 from surefix.filters.sight_records import (
     SightBank,
@@ -131,7 +132,7 @@ def decide_sights(
         about, P = settle(model, prior, sights, weight, restarts, mean, start)
         mean = about
         residual, variance = deleted_sights(model, sights, weight, mean, P)
-        anew = review_sights(prior, sights, weight, residual, variance)
+        anew = review_sights(prior, sights, residual, variance)
         if np.array_equal(anew, weight):
             break
         weight = anew
@@ -147,7 +148,7 @@ def _followed(trail: SightTrail, sights: Sights) -> tuple[FloatArray, BoolArray,
     for k in range(n - 1, -1, -1):
         used = (trail.used[k, slot] >> bits) & 1
         poor = (trail.poor[k, slot] >> bits) & 1
-        weight[k] = np.where(used, np.where(poor, 0.25, 1.0), 0.0)
+        weight[k] = np.where(used, np.where(poor, 1.0 / POORER, 1.0), 0.0)
         restarts[k] = trail.restarted[k, slot]
         slot = int(trail.parent[k, slot])
     return weight, restarts, slot

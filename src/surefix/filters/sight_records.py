@@ -9,8 +9,10 @@ import numpy as np
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = [
+    "MATURE_SIGHTS",
     "MOST_CHANNELS",
     "MOST_SIGHTS",
+    "YOUNG_SIGHTS",
     "SightBank",
     "SightFound",
     "SightModel",
@@ -21,7 +23,13 @@ __all__ = [
 ]
 
 MOST_SIGHTS: Final = 64
-"""Hypotheses kept after each sight."""
+"""Hypotheses kept after each sight, as long as it is open where the track is."""
+
+MATURE_SIGHTS: Final = 24
+"""Hypotheses kept later."""
+
+YOUNG_SIGHTS: Final = 50
+"""Epochs until then."""
 
 MOST_CHANNELS: Final = 30
 """Channels that fit into the bits of a decision."""
@@ -107,8 +115,8 @@ class SightBank(NamedTuple):
     ----------
     time
         (1,) s; NaN before the first epoch.
-    number
-        (1,) how many of the k are in use.
+    number, age
+        (1,) how many of the k are in use, and how many epochs they have seen.
     weight
         (k,) logarithms, their exponentials sum to 1.
     mean, covariance
@@ -133,6 +141,7 @@ class SightBank(NamedTuple):
 
     time: FloatArray
     number: IntArray
+    age: IntArray
     weight: FloatArray
     mean: FloatArray
     covariance: FloatArray
@@ -197,6 +206,7 @@ def empty_bank(axes: int, channels: int, most: int) -> SightBank:
     k, s = most + 1, 2 * axes
     return SightBank(
         np.full(1, np.nan),
+        np.zeros(1, np.int64),
         np.zeros(1, np.int64),
         np.zeros(k),
         np.zeros((k, s)),

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.sight_fit import POORER
 from surefix.filters.sight_hypotheses import predict_sight
 from surefix.filters.sight_records import SightModel, SightPrior, Sights
 from surefix.jit import helper, kernel
@@ -287,40 +288,36 @@ def deleted_sights(
 
 
 def review_sights(
-    prior: SightPrior, sights: Sights, weight: FloatArray, residual: FloatArray, variance: FloatArray
+    prior: SightPrior, sights: Sights, residual: FloatArray, variance: FloatArray
 ) -> FloatArray:
     """Decide anew which sights belong to the track.
 
-    Each is judged by its deleted residual under the accounts of the filter. Whether its channel was
-    wrong before and after it enters as the prior of a chain of two states.
+    Each is judged by its deleted residual under the accounts of the filter. The states of a
+    channel, right or wrong, are a Markov chain: a sight is left out where the probability that it
+    is wrong, given all of its channel, is above one half.
 
     Parameters
     ----------
     prior, sights
         As given to the filter.
-    weight
-        (n, c) decisions so far.
     residual, variance
         From `deleted_sights`.
 
     Returns
     -------
     weight
-        (n, c) new decisions; those fixed beforehand stay.
+        (n, c) new decisions, 0 where there is no sight; those fixed beforehand stay.
     """
-    out = np.zeros_like(weight)
-    for c in range(weight.shape[1]):
+    out = np.zeros_like(residual)
+    for c in range(residual.shape[1]):
         k = np.flatnonzero(np.isfinite(residual[:, c]))
-        if not len(k):
-            continue
         e2, S, R = residual[k, c] ** 2, variance[k, c], sights.variance[k, c]
-        odds = _chain(weight[k, c] == 0.0, float(prior.wrong[c]), float(prior.again[c]))
         usual = np.log1p(-prior.poor) + _normal(e2, S)
-        noisy = np.log(prior.poor) + _normal(e2, S + 3.0 * R)
+        noisy = np.log(prior.poor) + _normal(e2, S + (POORER - 1.0) * R)
         wide = prior.spread[c] ** 2 + S
         wild = -math.log(_PI) - 0.5 * np.log(wide) - np.log1p(e2 / wide)
-        taken = np.where(usual >= noisy, 1.0, 0.25)
-        out[k, c] = np.where(wild + odds > np.maximum(usual, noisy), 0.0, taken)
+        wrong = _chain(np.logaddexp(usual, noisy) - wild, prior.wrong[c], prior.again[c])
+        out[k, c] = np.where(wrong > 0.5, 0.0, np.where(usual >= noisy, 1.0, 1.0 / POORER))
     return np.where(np.isnan(sights.fixed), out, sights.fixed)
 
 
@@ -328,14 +325,26 @@ def _normal(e2: FloatArray, S: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (e2 / S + np.log(S) + _LOG_2PI))
 
 
-def _chain(out: BoolArray, wrong: float, again: float) -> FloatArray:
-    """Logarithm of the odds that a sight is wrong, given those before and after it, (n,)."""
-    into = np.array([[1.0 - wrong, wrong], [1.0 - again, again]])
-    before = np.concatenate([[0], out[:-1].astype(np.int64)])
-    after = np.concatenate([out[1:].astype(np.int64), [0]])
-    return np.asarray(
-        np.log(into[before, 1] * into[1, after]) - np.log(into[before, 0] * into[0, after])
-    )
+@kernel
+def _chain(odds: FloatArray, wrong: float, again: float) -> FloatArray:
+    """Probability that each sight of a channel is wrong; ``odds`` are logarithms, for right."""
+    n = odds.shape[0]
+    ahead = np.empty(n)  # probability of wrong by the sights up to here
+    p = wrong / (wrong + 1.0 - again)
+    for k in range(n):
+        p = p * again + (1.0 - p) * wrong
+        p = p / (p + (1.0 - p) * math.exp(min(odds[k], 300.0)))
+        ahead[k] = p
+    back = 0.5  # likelihood of the sights from the next on, of wrong against right
+    out = np.empty(n)
+    for k in range(n - 1, -1, -1):
+        out[k] = ahead[k] * back / (ahead[k] * back + (1.0 - ahead[k]) * (1.0 - back))
+        bad, good = back, (1.0 - back) * math.exp(min(odds[k], 300.0))
+        bad, good = bad / (bad + good), good / (bad + good)
+        of_bad = again * bad + (1.0 - again) * good
+        of_good = wrong * bad + (1.0 - wrong) * good
+        back = of_bad / (of_bad + of_good)
+    return out
 
 
 def add_bowl(mean: FloatArray, covariance: FloatArray, pole: FloatArray) -> FloatArray:
