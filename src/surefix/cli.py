@@ -16,6 +16,7 @@ from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
+from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
 
@@ -277,6 +278,7 @@ def reproduce(
 
 
 app.command()(compare)
+app.command()(locate)
 
 
 def main() -> None:

@@ -36,9 +36,7 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 
 @helper
-def prepare(
-    model: SightModel, bank: SightBank, i: int, z: FloatArray, anchor: FloatArray
-) -> None:
+def prepare(model: SightModel, bank: SightBank, i: int, z: FloatArray, anchor: FloatArray) -> None:
     """Take the predicted state of hypothesis i for the prior of an epoch; no sight is taken yet."""
     d, n = model.axes, 2 * model.axes
     for a in range(n):
@@ -85,7 +83,13 @@ def _pole(model: SightModel, z: FloatArray, anchor: FloatArray) -> FloatArray:
 
 @helper
 def _chart(
-    bank: SightBank, i: int, d: int, pole: FloatArray, step: FloatArray, x: FloatArray, T: FloatArray
+    bank: SightBank,
+    i: int,
+    d: int,
+    pole: FloatArray,
+    step: FloatArray,
+    x: FloatArray,
+    T: FloatArray,
 ) -> None:
     """State of a step and its derivative by ξ, (2d, 2d)."""
     n = 2 * d

@@ -159,7 +159,7 @@ def _remember(bank: SightBank, i: int, c: int, nu: float, wrong: bool) -> None:
 
 
 @helper
-def _close(model: SightModel, prior: SightPrior, bank: SightBank, sights: Sights, k: int) -> None:
+def _close(model: SightModel, bank: SightBank, sights: Sights, k: int) -> None:
     """End the epoch: states of all hypotheses, and what each thinks of the channels."""
     z, r, anchor = sights.z[k], sights.variance[k], sights.anchor[k]
     for i in range(bank.number[0]):
@@ -209,7 +209,10 @@ def _thin(model: SightModel, bank: SightBank, origin: IntArray, again: BoolArray
         for j in range(left):
             if keep and _alike(bank, j, i):
                 keep = False
-                more, less = max(bank.weight[j], bank.weight[i]), min(bank.weight[j], bank.weight[i])
+                more, less = (
+                    max(bank.weight[j], bank.weight[i]),
+                    min(bank.weight[j], bank.weight[i]),
+                )
                 bank.weight[j] = more + math.log1p(math.exp(less - more))
         if keep:
             if left != i:
@@ -325,7 +328,7 @@ def _run(
             one, two = two, one
             one.number[0] = count
             swaps += 1
-        _close(model, prior, one, sights, k)
+        _close(model, one, sights, k)
         _thin(model, one, origin, again)
         one.age[0] += 1
         _report(one, k, z, found)
@@ -388,5 +391,6 @@ def filter_sights(
         np.zeros(rows, np.int64),
     )
     known = np.zeros(0, np.int64) if restarts is None else restarts
+    sights = Sights._make(np.ascontiguousarray(column) for column in sights)  # one compiled form
     swaps = _run(model, prior, sights, known, one, two, found, trail)
     return (two if swaps % 2 else one), found, trail

@@ -1,4 +1,4 @@
-"""What the filter of single sights learns from a log: noise, motion, and how often sights are wrong.
+"""What the filter of single sights learns: noise, motion, and how often sights are wrong.
 
 In turns: decide which sights belong to the track under the present figures; take the figures that
 make these likeliest; count what was left out.
@@ -88,7 +88,7 @@ def with_figures(
     """
     variance = np.broadcast_to(np.square(figures.sigma[group]), sights.z.shape)
     density = np.full(model.axes, figures.process**2)
-    return model._replace(density=density), sights._replace(variance=np.array(variance))
+    return model._replace(density=density), sights._replace(variance=np.array(variance, order="C"))
 
 
 def learn_sights(

@@ -21,13 +21,8 @@ from surefix.filters.sight_records import (
     SightTrail,
     empty_bank,
 )
-from surefix.filters.sight_smoothing import (
-    add_bowl,
-    deleted_sights,
-    review_sights,
-    settle,
-    smooth_sights,
-)
+from surefix.filters.sight_review import add_bowl, deleted_sights, review_sights
+from surefix.filters.sight_smoothing import settle, smooth_sights
 from surefix.models.sights import RANGE
 from surefix.types import BoolArray, FloatArray
 

@@ -44,7 +44,7 @@ def begin_at(
         Hypotheses to be kept.
     """
     bank = empty_bank(model.axes, len(model.kind), most)
-    _put(bank, model, np.reshape(position, (1, -1)), np.reshape(sigma, (1, -1)), speed)
+    _put(bank, np.reshape(position, (1, -1)), np.reshape(sigma, (1, -1)), speed)
     return bank
 
 
@@ -88,7 +88,7 @@ def begin_around(
     if inside.any():
         place, sigma = place[inside], sigma[inside]
     bank = empty_bank(model.axes, len(model.kind), most)
-    _put(bank, model, place[:most], sigma[:most], speed)
+    _put(bank, place[:most], sigma[:most], speed)
     return bank
 
 
@@ -101,15 +101,13 @@ def _directions(axes: int, count: int) -> tuple[FloatArray, float]:
         angle = 2.0 * np.pi * i / count
         return np.column_stack([np.cos(angle), np.sin(angle)]), 2.0 * math.pi / count
     up = 1.0 - 2.0 * i / count
-    angle = np.pi * (1.0 + math.sqrt(5.0)) * i
+    turn = np.pi * (1.0 + math.sqrt(5.0)) * i
     flat = np.sqrt(1.0 - up * up)
-    spiral = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), up])
-    return spiral, math.sqrt(4.0 * math.pi / count)
+    spiral = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), up])
+    return np.asarray(spiral), math.sqrt(4.0 * math.pi / count)
 
 
-def _put(
-    bank: SightBank, model: SightModel, place: FloatArray, sigma: FloatArray, speed: float
-) -> None:
+def _put(bank: SightBank, place: FloatArray, sigma: FloatArray, speed: float) -> None:
     count, d = place.shape
     bank.number[0] = count
     bank.weight[:count] = -math.log(count)

@@ -110,4 +110,6 @@ def _check(source: str, names: Sequence[str], wanted: Sequence[str]) -> None:
     for name in wanted:
         if name not in names:
             listed = ", ".join(list(names)[:30])
-            raise ParseError(f"{source}: no column {name}", f"one of {listed}", "correct the survey")
+            raise ParseError(
+                f"{source}: no column {name}", f"one of {listed}", "correct the survey"
+            )

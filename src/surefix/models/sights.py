@@ -47,7 +47,7 @@ def sight(kind: int, anchor: FloatArray, x: FloatArray, d: int, H: FloatArray) -
     if kind >= COMPONENT:
         c = kind - COMPONENT
         H[c] = 1.0
-        return x[c] - anchor[c] if c < d else x[c]
+        return float(x[c] - anchor[c]) if c < d else float(x[c])
     flat = 0.0
     for i in range(min(d, 2)):
         flat += (x[i] - anchor[i]) * (x[i] - anchor[i])

@@ -165,7 +165,9 @@ def read_survey(path: str | Path) -> Survey:
     return Survey(sights=found, **_known(place, Survey, content))
 
 
-def _known(place: Path, kind: type[SightSource | Survey], given: Mapping[str, Any]) -> dict[str, Any]:
+def _known(
+    place: Path, kind: type[SightSource | Survey], given: Mapping[str, Any]
+) -> dict[str, Any]:
     names = [each.name for each in fields(kind) if each.init and each.name != "sights"]
     for name in given:
         if name not in names:
