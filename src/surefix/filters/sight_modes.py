@@ -23,12 +23,14 @@ from surefix.filters.sight_records import (
 )
 from surefix.filters.sight_review import add_bowl, deleted_sights, review_sights
 from surefix.filters.sight_smoothing import settle, smooth_sights
-from surefix.models.sights import RANGE
+from surefix.filters.sight_starts import begin_around
+from surefix.models.sights import COMPONENT, RANGE
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["SightDecisions", "SightEstimate", "decide_sights", "offline_sights", "realtime_sights"]
 
 _SWEEPS = 12
+_PREFERS = 5.0  # nats by which the backward account must be the likelier
 _WIDER = 10.0  # factor on the deviations of a start that was chosen among several
 
 
@@ -112,17 +114,21 @@ def offline_sights(
 def decide_sights(
     model: SightModel, prior: SightPrior, sights: Sights, bank: SightBank
 ) -> SightDecisions:
-    """Decide what belongs to the track by the whole series, and smooth it; see `offline_sights`."""
-    _, _, trail = filter_sights(model, prior, sights, bank)
-    weight, restarts, slot = _followed(trail, sights)
-    alone = _alone(model, bank, slot)
-    decided = sights._replace(fixed=np.where(np.isfinite(sights.z), weight, np.nan))
-    _, found, _ = filter_sights(
-        model, prior, decided, alone, restarts=restarts.astype(np.int64), traced=False
-    )
-    wider = 1.0 if bank.number[0] == 1 else _WIDER
-    start = alone.mean[0], alone.covariance[0] * wider**2
-    mean, P = smooth_sights(model, prior, sights.time, restarts, found.mean, found.covariance)
+    """Decide what belongs to the track by the whole series, and smooth it; see `offline_sights`.
+
+    A track whose beginning is not known is also sought from its end backward; the account under
+    which the sights are the likelier counts.
+    """
+    weight, restarts, mean, start, evidence = _account(model, prior, sights, bank)
+    if bank.number[0] > 1 and (np.isfinite(sights.z[-1]) & (model.kind == RANGE)).any():
+        turned = _turned(model, sights)
+        from_end = begin_around(model, turned, prior.speed, len(bank.weight) - 1)
+        back = _account(model, prior, turned, from_end)
+        if back.evidence > evidence + _PREFERS:
+            flip = np.repeat([1.0, -1.0], model.axes)
+            weight, mean = back.weight[::-1], back.mean[::-1] * flip
+            restarts = np.concatenate([[False], back.restarts[:0:-1]])
+            start = mean[0], start[1]
     for _ in range(_SWEEPS):
         about, P = settle(model, prior, sights, weight, restarts, mean, start)
         mean = about
@@ -132,6 +138,39 @@ def decide_sights(
             break
         weight = anew
     return SightDecisions(weight, restarts, about, start, mean, P, residual, variance)
+
+
+class _Account(NamedTuple):
+    """Decisions of one direction, the track that follows, its start, and the log-likelihood."""
+
+    weight: FloatArray
+    restarts: BoolArray
+    mean: FloatArray
+    start: tuple[FloatArray, FloatArray]
+    evidence: float
+
+
+def _account(model: SightModel, prior: SightPrior, sights: Sights, bank: SightBank) -> _Account:
+    """What the likeliest hypothesis at the end says of all, and a first smooth track."""
+    _, found, trail = filter_sights(model, prior, sights, bank)
+    evidence = float(found.evidence.sum())
+    weight, restarts, slot = _followed(trail, sights)
+    alone = _alone(model, bank, slot)
+    decided = sights._replace(fixed=np.where(np.isfinite(sights.z), weight, np.nan))
+    _, found, _ = filter_sights(
+        model, prior, decided, alone, restarts=restarts.astype(np.int64), traced=False
+    )
+    wider = 1.0 if bank.number[0] == 1 else _WIDER
+    mean, _ = smooth_sights(model, prior, sights.time, restarts, found.mean, found.covariance)
+    start = alone.mean[0], alone.covariance[0] * wider**2
+    return _Account(weight, restarts, mean, start, evidence)
+
+
+def _turned(model: SightModel, sights: Sights) -> Sights:
+    """The same sights with time running backward: velocities change their sign."""
+    sign = np.where(model.kind >= COMPONENT + model.axes, -1.0, 1.0)
+    back = Sights._make(column[::-1] for column in sights)
+    return back._replace(time=-back.time, z=back.z * sign)
 
 
 def _followed(trail: SightTrail, sights: Sights) -> tuple[FloatArray, BoolArray, int]:

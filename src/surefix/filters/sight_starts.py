@@ -20,7 +20,7 @@ from surefix.types import FloatArray
 
 __all__ = ["begin_around", "begin_at", "first_epoch"]
 
-_WIDE = 1.2  # standard deviation of a start, in distances to its neighbour
+_WIDE = 1.3  # standard deviation of a start, in distances to its neighbour
 
 
 def begin_at(
@@ -78,11 +78,10 @@ def begin_around(
         raise OptionsError(
             "no range in the first epoch", "at least one", "say where the track begins"
         )
-    share = max(most // len(seen), 2)
-    direction, apart = _directions(model.axes, share)
-    radius = np.maximum(np.repeat(sights.z[0, seen], len(direction)), 1e-3)
-    place = np.repeat(sights.anchor[0, seen], len(direction), axis=0)
-    place = place + radius[:, None] * np.tile(direction, (len(seen), 1))
+    direction, apart = _directions(model.axes, most)
+    turn = seen[np.arange(len(direction)) % len(seen)]
+    radius = np.maximum(sights.z[0, turn], 1e-3)
+    place = sights.anchor[0, turn] + radius[:, None] * direction
     sigma = np.repeat(_WIDE * apart * radius[:, None], model.axes, axis=1)
     inside = ((place >= model.within[:, 0]) & (place <= model.within[:, 1])).all(axis=1)
     if inside.any():
