@@ -7,7 +7,9 @@ import numpy as np
 from surefix.filters.sight_records import SightModel, SightPrior, Sights
 from surefix.models.sights import RANGE, expected
 
-FAR = np.array([[0.0, 0, 0], [100, 0, 0], [100, 100, -5], [0, 100, -20], [50, -60, -10], [-60, 50, -3]])
+FAR = np.array(
+    [[0.0, 0, 0], [100, 0, 0], [100, 100, -5], [0, 100, -20], [50, -60, -10], [-60, 50, -3]]
+)
 SMALL = np.array([[-0.48, 0, 0], [0, 0.46, 0], [0.48, -0.04, 0], [0, 0, -0.3]])
 FLAT = np.array([[0.0, 0], [50, 0], [0, 50]])
 
@@ -48,7 +50,9 @@ def prior_of(channels, **changes):
 def sights_of(time, z, sigma, anchors):
     n, c = z.shape
     anchors = np.broadcast_to(anchors, (n, c, np.shape(anchors)[-1])).copy()
-    return Sights(time, z, np.full((n, c), 1.0) * np.square(sigma), anchors, np.full((n, c), np.nan))
+    return Sights(
+        time, z, np.full((n, c), 1.0) * np.square(sigma), anchors, np.full((n, c), np.nan)
+    )
 
 
 def spoiled(rng, z, share, again, size):
