@@ -74,10 +74,13 @@ def test_bad_cells_and_negative_ranges_are_missing(world):
     log["r1"] = [f"{value:.3f}" for value in log["r1"]]
     log["r1"][7] = "x"
     log["r2"] = np.where(np.arange(120) % 3, log["r2"], -1.0)
+    log["r3"] = log["r3"].copy()
+    log["r3"][[20, 30]] = np.inf, 1e300
     located = sf.locate(log, survey_of(FAR[:4], process=0.02))
     verdict = codes(located)
     assert verdict[7, 1] == Verdict.MISSING
     assert (verdict[::3, 2] == Verdict.MISSING).all()
+    assert (verdict[[20, 30], 3] == Verdict.MISSING).all()
     assert located.problems[0].total == 1
     assert np.isfinite(located.position).all()
 

@@ -21,6 +21,8 @@ __all__ = ["LocateMode", "Located", "locate_sights"]
 
 LocateMode = Literal["offline", "realtime"]
 
+_ABSURD = 1e9  # m, from which on a value is damage
+
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
@@ -120,7 +122,7 @@ def _read(data: Any, survey: Survey) -> _Read:
         for a, place in enumerate(source.at):
             anchor[:, c, a] = columns[place] if isinstance(place, str) else place
     z[~np.isfinite(anchor).all(axis=2)] = np.nan
-    z[~np.isfinite(z)] = np.nan
+    z[~(np.abs(z) < _ABSURD)] = np.nan
     known = np.isfinite(time)
     before = np.fmax.accumulate(np.concatenate([[-np.inf], np.where(known, time, -np.inf)]))[:-1]
     late = ~(time >= before) & known
