@@ -27,6 +27,7 @@ _ENOUGH = 0.02  # relative change of the figures that ends the rounds
 _EPOCHS = 2000  # of a log that are learnt from
 _FEW_EPOCHS = 300  # … and that choose the figures to begin with
 _DENSITIES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)  # roots of, m/s^1.5, tried at first
+_QUANTILE, _NORMAL = 0.2, 0.2533  # most neighbours may be wrong; the same of |N(0, 1)|
 _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
 _LEAST_WILD = 5.0  # … and at least
 _FEW = 5  # gross errors whose scale is believed
@@ -161,7 +162,7 @@ def _scales(
             if model.kind[c] not in (RANGE,) and model.kind[c] < COMPONENT:
                 off = np.angle(np.exp(1j * off))
             off /= np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
-            found.append(1.4826 * float(np.median(np.abs(off))))
+            found.append(float(np.quantile(np.abs(off), _QUANTILE)) / _NORMAL)
         angle = model.kind[group == g].min() in range(RANGE + 1, COMPONENT)
         out[g] = max(found, default=_BY_KIND["rad" if angle else "m"])
     return np.maximum(out, np.maximum(least, 1e-6))
