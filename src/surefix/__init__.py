@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surefix.api import clean, to_table
+    from surefix.api import clean, locate, to_table
     from surefix.errors import (
         InputError,
         MissingExtraError,
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
         ParseError,
         SurefixError,
     )
+    from surefix.pipelines.locate import Located
     from surefix.pipelines.options import CleanOptions
+    from surefix.pipelines.survey import SightSource, Survey
     from surefix.types import Cleaned, Event, Noise, Problem, Reason, Track, Verdict, Verdicts
 
 __all__ = [
@@ -30,6 +32,7 @@ __all__ = [
     "Cleaned",
     "Event",
     "InputError",
+    "Located",
     "MissingExtraError",
     "Noise",
     "OptionsError",
@@ -37,17 +40,24 @@ __all__ = [
     "ParseError",
     "Problem",
     "Reason",
+    "SightSource",
     "SurefixError",
+    "Survey",
     "Track",
     "Verdict",
     "Verdicts",
     "clean",
+    "locate",
     "to_table",
 ]
 
 _HOME = {
     "CleanOptions": "surefix.pipelines.options",
+    "Located": "surefix.pipelines.locate",
+    "SightSource": "surefix.pipelines.survey",
+    "Survey": "surefix.pipelines.survey",
     "clean": "surefix.api",
+    "locate": "surefix.api",
     "to_table": "surefix.api",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "surefix.errors"),
 }

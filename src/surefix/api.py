@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import Data, open_inputs
+from surefix.pipelines.locate import Located, LocateMode, locate_sights
 from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.survey import Survey, read_survey
 from surefix.types import Cleaned
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["clean", "to_table"]
+__all__ = ["clean", "locate", "to_table"]
 
 
 def clean(
@@ -61,6 +64,27 @@ def clean(
         columns=columns,
     )
     return clean_sources(sources, options or CleanOptions())
+
+
+def locate(data: Data, survey: Survey | str | Path, *, mode: LocateMode = "offline") -> Located:
+    """Estimate positions from ranges, bearings and depths, of which any may be wrong.
+
+    Parameters
+    ----------
+    data
+        One table: a path, or a data frame or mapping of names to arrays.
+    survey
+        What its columns mean and where the receivers are, or the TOML file that says so.
+    mode
+        ``offline`` or ``realtime``.
+
+    Raises
+    ------
+    InputError, ParseError, OptionsError
+        What was given, what was expected, and the remedy.
+    """
+    known = survey if isinstance(survey, Survey) else read_survey(survey)
+    return locate_sights(data, known, mode)
 
 
 def to_table(cleaned: Cleaned) -> pa.Table:
