@@ -90,7 +90,7 @@ def clean(
         ]
         | None,
         typer.Option(
-            help="Several hypotheses (the default), a robust loss, or a cleaner before a plain filter."
+            help="Several hypotheses (the default), a robust loss, or a cleaner before a filter."
         ),
     ] = None,
     model: Annotated[

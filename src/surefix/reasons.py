@@ -49,7 +49,7 @@ def _where(mask: int) -> str:
 def vector(offset: Sequence[float]) -> str:
     """An offset in the axes that have one; metres, if it has several."""
     known = [f"{value:.1f}".replace("-", "−") for value in offset if math.isfinite(value)]
-    return f"({', '.join(known)}) m" if len(offset) > 1 else known[0] if known else "unknown"
+    return f"({', '.join(known)}) m" if len(offset) > 1 else ", ".join(known)
 
 
 def _text(
@@ -70,7 +70,9 @@ def _text(
         case Reason.AXIS_OFF:
             return f"{sigma:.1f} σ off {_where(int(detail))}, the rest used"
         case Reason.RUN:
-            return f"in a run of {int(detail)} with offset {vector(offset)}, {sigma:.1f} σ off"
+            known = any(math.isfinite(value) for value in offset)
+            by = f" with offset {vector(offset)}" if known else ""
+            return f"in a run of {int(detail)}{by}, {sigma:.1f} σ off"
         case Reason.JUMP:
             return f"jump accepted, dated back to {clock(detail)}"
         case Reason.REPEATED:

@@ -282,6 +282,7 @@ def _verdicts(read: _Read, whole: SightEstimate) -> Verdicts:
         standardised,
         reason.ravel(),
         detail.ravel(),
+        np.full((flat.size, 3), np.nan),
     )
 
 
