@@ -20,7 +20,7 @@ STRANGE = 16.0
 CONFIRMED = 3
 PREFERS = 3.0
 ALIKE = 0.7
-PATIENCE = 1.25
+PATIENCE, AIDED = 1.25, 5.0
 ANEW = 0.1
 HASTE = 2.0
 
@@ -51,6 +51,7 @@ class Account(NamedTuple):
     rate: tuple = ()
     turns: tuple = ()
     touched: int = -1
+    moved: float = np.nan
     said: tuple = ()
 
 
@@ -233,7 +234,9 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty = account.faulty
     out = [
-        _told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step),
+        _told(
+            account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step, moved=time
+        ),
         _told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
     gap = time - steps[account.touched] if account.touched >= 0 else 0.0
@@ -252,7 +255,9 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     faulty = faulty - {sensor}
     return [
         *out,
-        _told(account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=step),
+        _told(
+            account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=step, moved=time
+        ),
     ]
 
 
@@ -353,7 +358,7 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
             speed = max(_agility(motion, a, gap), HASTE * abs(off[a]) / far)
             turns = _set(turns, a, (*turns[a], (touched, speed)))
         out.append(_told(used(account._replace(turns=turns), axes), gain, "turns"))
-    due = [a for a in axes if account.seen[a] and _due(prior, account.lost[a], time)]
+    due = [a for a in axes if account.seen[a] and _due(prior, account, a, time)]
     if due and (due == axes or not own):
         fresh = account
         for a in due:
@@ -376,9 +381,11 @@ def _agility(motion, a, gap):
     return 30.0 * np.sqrt(motion.density[a] * gap)
 
 
-def _due(prior, lost, time):
+def _due(prior, account, a, time):
     """Whether an axis has been left out for so long that its track may begin anew."""
-    return lost[1] >= CONFIRMED and time - lost[0] >= PATIENCE * prior.longest
+    since, count = account.lost[a]
+    patience = AIDED if account.moved > since else PATIENCE
+    return count >= CONFIRMED and time - since >= patience * prior.longest
 
 
 def _forgotten(account, a, step, speed):

@@ -128,8 +128,8 @@ class Bank(NamedTuple):
         (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
     lost, missed
         (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
-    touched
-        (k,) s, when an observation was last used.
+    touched, moved
+        (k,) s, when an observation was last used, and when a velocity was.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -149,6 +149,7 @@ class Bank(NamedTuple):
     lost: FloatArray
     missed: IntArray
     touched: FloatArray
+    moved: FloatArray
     announced: FloatArray
 
 
@@ -209,6 +210,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d)),
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
+        np.full(most, np.nan),
         np.full(most, np.nan),
         np.full(1, np.nan),
     )

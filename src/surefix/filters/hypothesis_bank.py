@@ -60,6 +60,7 @@ def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> N
     to.length[i] = source.length[k]
     to.faulty[i] = source.faulty[k]
     to.touched[i] = source.touched[k]
+    to.moved[i] = source.moved[k]
 
 
 @helper

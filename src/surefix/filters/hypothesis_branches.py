@@ -45,7 +45,8 @@ _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
 _STRANGE = 16.0  # … and from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
-_PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew
+_PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
+_AIDED = 5.0  # … or that many where velocities have supported it meanwhile
 _ANEW = 0.1  # … and how probable that is then
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -307,7 +308,9 @@ def position_branches(
             if math.isnan(z[a]):
                 continue
             due = bank.seen[k, a] and bank.missed[k, a] >= CONFIRMED
-            if due and time - bank.lost[k, a] >= _PATIENCE * prior.longest:
+            aided = bank.moved[k] > bank.lost[k, a]
+            patience = (_AIDED if aided else _PATIENCE) * prior.longest
+            if due and time - bank.lost[k, a] >= patience:
                 anew |= RESTART << a
                 fresh += _anywhere(prior.spread[a] * prior.spread[a] + variance[a])
             else:

@@ -109,6 +109,7 @@ def _apply_velocity(
                 change_rate(P, motion.order, gap, rate)
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
     bank.touched[i] = time
+    bank.moved[i] = time
 
 
 @helper
