@@ -435,6 +435,9 @@ def _lasting(prior, account, time):
 def _mixture(motion, prior, steps, accounts, evidence):
     """Moments of the mixture; a position only by those accounts that know one."""
     d, order = motion.axes, motion.order
+    whole = accounts
+    likeliest = max(accounts, key=lambda account: account.weight)
+    accounts = [each for each in accounts if each is likeliest or "turns" not in each.said[-1]]
     mean, sigma = np.full(order * d, np.nan), np.full(order * d, np.nan)
     for a in range(d):
         known = [_moments(motion, prior, steps, account, a) for account in accounts]
@@ -450,4 +453,4 @@ def _mixture(motion, prior, steps, accounts, evidence):
             gap = _wrap(m - centre, motion.period) if s == 0 else m - centre
             mean[s * d + a] = centre + w @ gap
             sigma[s * d + a] = np.sqrt(w @ P + w @ gap**2 - (w @ gap) ** 2)
-    return Mixture(mean, sigma, evidence, accounts)
+    return Mixture(mean, sigma, evidence, whole)

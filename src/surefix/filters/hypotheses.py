@@ -81,6 +81,10 @@ class Prior(NamedTuple):
         (2·axes,) scale of the gross errors per component, m and m/s.
     sigma_velocity
         Standard deviation of a velocity nothing is known about, m/s.
+    adapt
+        (`MOST_SENSORS` + 1, 2) how fast the noise of the positions and velocities of each sensor
+        follows what is observed: 1 over the number of observations remembered, 0 for not at all.
+        The last row is for the process noise, (0, 0) or (gain, 0).
     """
 
     isolated: float
@@ -94,6 +98,7 @@ class Prior(NamedTuple):
     again: float
     spread: FloatArray
     sigma_velocity: float
+    adapt: FloatArray = np.zeros((MOST_SENSORS + 1, 2))
 
 
 class Bank(NamedTuple):
@@ -130,6 +135,10 @@ class Bank(NamedTuple):
         (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
     touched, moved
         (k,) s, when an observation was last used, and when a velocity was.
+    scale
+        (`MOST_SENSORS` + 1, 2) factor of the variances, and of the process noise, as adapted.
+    last
+        (2·axes,) the standardised innovations that were used last.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -150,6 +159,8 @@ class Bank(NamedTuple):
     missed: IntArray
     touched: FloatArray
     moved: FloatArray
+    scale: FloatArray
+    last: FloatArray
     announced: FloatArray
 
 
@@ -180,6 +191,8 @@ class Found(NamedTuple):
         (n,) s, where the likeliest hypothesis just took a run for a true jump: when that began.
     offset
         (n, axes) offset of the run that the epoch's fix belongs to; NaN if to none.
+    scale
+        (n, 2) factor of the variance of the epoch's position and velocity, as adapted.
     """
 
     mean: FloatArray
@@ -190,6 +203,7 @@ class Found(NamedTuple):
     run: IntArray
     since: FloatArray
     offset: FloatArray
+    scale: FloatArray
 
 
 def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
@@ -212,5 +226,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d), np.int64),
         np.full(most, np.nan),
         np.full(most, np.nan),
+        np.ones((MOST_SENSORS + 1, 2)),
+        np.zeros(2 * d),
         np.full(1, np.nan),
     )

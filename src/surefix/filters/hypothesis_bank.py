@@ -242,13 +242,17 @@ def merge(motion: Motion, bank: Bank, count: int, keep: BoolArray) -> None:
 
 
 @helper
-def report(motion: Motion, bank: Bank, k: int, found: Found) -> None:
-    """Mean and standard deviations of the mixture over the hypotheses that know the axis."""
+def report(motion: Motion, bank: Bank, said: IntArray, best: int, k: int, found: Found) -> None:
+    """Mean and standard deviations of the mixture over the hypotheses that know the axis.
+
+    A manoeuvre that just began counts from the next observation on, unless it is the likeliest: a
+    wild fix would leave the mixture no mean, however improbable it makes that account.
+    """
     d, order = motion.axes, motion.order
     for a in range(d):
         mass = 0.0
         for i in range(bank.number[0]):
-            if bank.seen[i, a]:
+            if bank.seen[i, a] and (i == best or not said[i] & MANOEUVRE):
                 mass += math.exp(bank.weight[i])
         for s in range(order):
             c = s * d + a
@@ -264,6 +268,8 @@ def report(motion: Motion, bank: Bank, k: int, found: Found) -> None:
             whole = 0.0
             for i in range(bank.number[0]):
                 if s == 0 and not bank.seen[i, a]:
+                    continue
+                if i != best and said[i] & MANOEUVRE:
                     continue
                 if first:
                     reference = bank.mean[i, a, s]

@@ -189,7 +189,7 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
     if out.sum() >= _FEW:
         size = float(np.median(np.abs(residual[:, :axes][out])))
         spread[:axes] = max(size, _LEAST_WILD * sigma)
-    return prior._replace(spread=spread, **shares)
+    return Prior._make((prior._asdict() | shares | {"spread": spread}).values())
 
 
 def _likeliest(

@@ -20,6 +20,7 @@ from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
     MANOEUVRE,
+    MOST_SENSORS,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -52,29 +53,14 @@ from surefix.filters.hypothesis_branches import (
     CONFIRMED,
     position_branches,
     velocity_branches,
-    wrapped,
 )
+from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track_step import VAGUE_RATE
 from surefix.jit import helper, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
-
-
-@helper
-def _innovate(motion: Motion, bank: Bank, k: int, z: FloatArray, r: FloatArray, out: Found) -> None:
-    """Standardised innovations of the likeliest hypothesis; nought where nothing is observed."""
-    d = motion.axes
-    best = best_of(bank.weight, bank.number[0])
-    for a in range(d):
-        out.weight[k, a] = np.nan if math.isnan(z[a]) else 0.0
-        out.weight[k, d + a] = np.nan if math.isnan(z[d + a]) else 0.0
-        if bank.seen[best, a]:
-            nu = wrapped(z[a] - bank.mean[best, a, 0], motion.period)
-            out.standardised[k, a] = nu / math.sqrt(bank.covariance[best, a, 0, 0] + r[a])
-        nu = z[d + a] - bank.mean[best, a, 1]
-        out.standardised[k, d + a] = nu / math.sqrt(bank.covariance[best, a, 1, 1] + r[d + a])
 
 
 @helper
@@ -206,6 +192,8 @@ def _run(
     origin, before = np.empty(most, np.int64), np.empty(most, np.int64)
     said, spoken = np.empty(most, np.int64), np.empty(most, np.int64)
     keep = np.empty(most, np.bool_)
+    r, share = np.empty(2 * d), np.zeros(2 * d)
+    adapting = np.any(prior.adapt > 0.0)
     swaps = 0
     speed = prior.sigma_velocity
     time = one.time[0]
@@ -217,17 +205,19 @@ def _run(
         dt = 0.0 if math.isnan(time) else epochs.time[k] - time
         time = epochs.time[k]
         sensor = epochs.sensor[k] if len(epochs.sensor) else 0
-        z, r, forced = epochs.z[k], epochs.variance[k], epochs.fixed[k]
+        z, forced = epochs.z[k], epochs.fixed[k]
+        for c in range(2 * d):
+            found.scale[k, c // d] = one.scale[sensor, c // d]
+            r[c] = epochs.variance[k, c] * one.scale[sensor, c // d]
         if epochs.jump[k]:
             _displace(motion, one, epochs.jump[k])
         for i in range(one.number[0]):
             origin[i], said[i] = i, 0
             if dt > 0.0:
                 for a in range(d):
-                    predict_axis(
-                        one.mean[i, a], one.covariance[i, a], motion.order, dt, motion.density[a]
-                    )
-        _innovate(motion, one, k, z, r, found)
+                    q = motion.density[a] * one.scale[MOST_SENSORS, 0]
+                    predict_axis(one.mean[i, a], one.covariance[i, a], motion.order, dt, q)
+        innovate(motion, one, k, z, r, found, share)
         placed = moved = False
         for a in range(d):
             placed = placed or not math.isnan(z[a])
@@ -262,12 +252,14 @@ def _run(
         if one.number[0] > 1:
             one.number[0] = _close_ranks(motion, one, keep, origin, said)
         best = _judge(motion, prior, one, k, said, found)
+        if adapting:
+            adapt(motion, prior, one, k, sensor, share, found)
         if traced:
             trail.best[k] = best
             for i in range(one.number[0]):
                 trail.parent[k, i] = origin[i]
                 trail.code[k, i] = said[i]
-        report(motion, one, k, found)
+        report(motion, one, said, best, k, found)
     one.time[0] = time
     return swaps
 
@@ -297,7 +289,8 @@ def filter_hypotheses(
     """
     n, most = len(epochs.time), len(bank.weight)
     one = _copied(bank)
-    two = _copied(bank)._replace(time=one.time, number=one.number, announced=one.announced)
+    shared = {name: getattr(one, name) for name in ("time", "number", "scale", "last", "announced")}
+    two = _copied(bank)._replace(**shared)
     found = _blank(motion, n)
     rows = n if traced else 0
     trail = Trail(
@@ -322,4 +315,5 @@ def _blank(motion: Motion, n: int) -> Found:
         np.zeros(n, np.int64),
         np.full(n, np.nan),
         np.full((n, motion.axes), np.nan),
+        np.ones((n, 2)),
     )

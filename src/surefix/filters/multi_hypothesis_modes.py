@@ -59,6 +59,7 @@ def realtime_hypotheses(
         since,
         found.run,
         found.offset,
+        found.scale[:, 0],
     )
 
 

@@ -160,6 +160,8 @@ class Estimate(NamedTuple):
         (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none.
     offset
         (n, axes) that offset; NaN outside of runs.
+    scale
+        (n,) factor of the variance of the epoch's position since it was settled, 1 if it stays.
     """
 
     mean: FloatArray
@@ -171,3 +173,4 @@ class Estimate(NamedTuple):
     since: FloatArray
     run: IntArray
     offset: FloatArray
+    scale: FloatArray

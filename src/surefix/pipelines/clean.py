@@ -269,9 +269,10 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     judged = Verdicts._make(column[fix] for column in judged)
     session.held += int((judged.reason == Reason.HELD).sum())
     events += jump_events(judged)
+    scale = np.ones(len(fix)) if found is None else found.scale[fix]
     told = judged, track.time[fix], mine.fixes.sensor, session.sensors
     events += run_events(*told, growing=options.mode == "realtime")
-    found_events, session.health = sensor_events(*told, session.health)
+    found_events, session.health = sensor_events(*told, scale, session.health)
     events += found_events
     return replace(
         nothing(tuple(session.sensors), options, setup),

@@ -62,6 +62,7 @@ def sensor_events(
     time: FloatArray,
     sensor: IntArray,
     sensors: list[str],
+    scale: FloatArray,
     health: Health | None,
 ) -> tuple[list[Event], Health]:
     """Sensors that are mostly rejected or noisier than was settled, and those that recover.
@@ -70,6 +71,8 @@ def sensor_events(
     ----------
     judged, time, sensor, sensors
         As for `run_events`.
+    scale
+        (n,) by how much the variance of each fix was changed since it was settled.
     health
         Of the fixes before these; None at the beginning.
 
@@ -83,7 +86,7 @@ def sensor_events(
     known = np.isfinite(judged.standardised[rows])
     total = np.where(known, judged.standardised[rows], 0.0) ** 2
     count = known.sum(axis=1)
-    square = np.where(count > 0, total.sum(axis=1) / np.maximum(count, 1), np.nan)
+    square = np.where(count > 0, total.sum(axis=1) / np.maximum(count, 1), np.nan) * scale[rows]
     out = judged.verdict[rows] == Verdict.REJECTED
     health, what, figure = watch(health, sensor[rows], out, square)
     events = []

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.filters.hypotheses import Prior
+from surefix.filters.hypotheses import MOST_SENSORS, Prior
 from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
@@ -16,6 +16,7 @@ from surefix.types import FloatArray, Noise
 
 __all__ = ["Figures", "settle_noise"]
 
+_MEMORY = 300.0  # observations by which noise is adapted in real time
 _LOOKED_AT = 50_000  # rows whose digits are looked at
 _PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
@@ -101,6 +102,8 @@ def settle_noise(
         density[[axes.index(i) for i in block.axes]] = block.found.process**2
         noise += _named(block, sensors, model)
     prior = _joined(blocks, axes)
+    if prior is not None and options.mode == "realtime":
+        prior = prior._replace(adapt=_adapting(blocks))
     return Figures(model, sigma_position, sigma_velocity, density, tuple(noise), prior)
 
 
@@ -171,6 +174,24 @@ def _joined(blocks: list[_Block], axes: tuple[int, ...]) -> Prior | None:
             spread[at], spread[d + at] = block.prior.spread[j], block.prior.spread[own + j]
     alone = last.isolated - first.isolated if last is not first else 0.0
     return first._replace(partial=max(first.partial, alone), spread=spread)
+
+
+def _adapting(blocks: list[_Block]) -> FloatArray:
+    """How fast figures follow a stream: those that nobody gave or declared."""
+    adapt = np.zeros((MOST_SENSORS + 1, 2))
+    sensors = len(blocks[0].given.position)
+    for sensor in range(min(sensors, MOST_SENSORS)):
+        for part, name in enumerate(("position", "velocity")):
+            free = True
+            for block in blocks:
+                d, mine = len(block.axes), block.observations.sensor == sensor
+                declared = block.observations.declared[mine, part * d : (part + 1) * d]
+                free &= bool(np.isnan(getattr(block.given, name)[sensor]))
+                free &= not np.isfinite(declared).any()
+            adapt[sensor, part] = 1.0 / _MEMORY if free else 0.0
+    if all(np.isnan(block.given.process) for block in blocks):
+        adapt[MOST_SENSORS, 0] = 1.0 / _MEMORY
+    return adapt
 
 
 def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool) -> NoiseFigures:

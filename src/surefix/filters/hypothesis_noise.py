@@ -1,0 +1,89 @@
+"""Kernels that follow the noise: innovations of the likeliest hypothesis, and what they teach."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from surefix.filters.hypotheses import MOST_SENSORS, Bank, Found, Prior
+from surefix.filters.hypothesis_bank import best_of
+from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.records import Motion
+from surefix.jit import helper
+from surefix.types import FloatArray
+
+__all__ = ["adapt", "innovate"]
+
+_PROCESS = MOST_SENSORS  # row of the process noise
+_LARGEST_ONE = 3.0  # no innovation counts for more when noise is adapted …
+_LARGEST = _LARGEST_ONE**2
+_MEAN_SQUARE = 0.9889  # … and then their squares have this mean, if all is well
+_QUIET, _LOUD = 0.01, 100.0  # factors of a variance within which it is adapted
+
+
+@helper
+def innovate(
+    motion: Motion,
+    bank: Bank,
+    k: int,
+    z: FloatArray,
+    r: FloatArray,
+    out: Found,
+    share: FloatArray,
+) -> None:
+    """Standardised innovations of the likeliest hypothesis; nought where nothing is observed.
+
+    ``share`` becomes what part of each variance is that of the observation.
+    """
+    d = motion.axes
+    best = best_of(bank.weight, bank.number[0])
+    for a in range(d):
+        out.weight[k, a] = np.nan if math.isnan(z[a]) else 0.0
+        out.weight[k, d + a] = np.nan if math.isnan(z[d + a]) else 0.0
+        if bank.seen[best, a]:
+            nu = wrapped(z[a] - bank.mean[best, a, 0], motion.period)
+            S = bank.covariance[best, a, 0, 0] + r[a]
+            out.standardised[k, a] = nu / math.sqrt(S)
+            share[a] = r[a] / S
+        nu = z[d + a] - bank.mean[best, a, 1]
+        S = bank.covariance[best, a, 1, 1] + r[d + a]
+        out.standardised[k, d + a] = nu / math.sqrt(S)
+        share[d + a] = r[d + a] / S
+
+
+@helper
+def adapt(
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    k: int,
+    sensor: int,
+    share: FloatArray,
+    out: Found,
+) -> None:
+    """Let the noise figures follow the innovations that were used.
+
+    Squares that are larger than supposed call for more noise of the sensor; innovations that
+    resemble the ones before call for more noise of the process.
+    """
+    d = motion.axes
+    for part in range(2):
+        gain, total, whole, alike, count = prior.adapt[sensor, part], 0.0, 0.0, 0.0, 0
+        for a in range(d):
+            c = part * d + a
+            s = out.standardised[k, c]
+            if not out.weight[k, c] > 0.5 or math.isnan(s):
+                continue
+            total += share[c] * (min(s * s, _LARGEST) - _MEAN_SQUARE)
+            whole += share[c]
+            s = min(max(s, -_LARGEST_ONE), _LARGEST_ONE)
+            alike += s * bank.last[c]
+            bank.last[c] = s
+            count += 1
+        if count == 0:
+            continue
+        step = math.exp(gain * total / max(whole, 1e-9))
+        bank.scale[sensor, part] = min(max(bank.scale[sensor, part] * step, _QUIET), _LOUD)
+        step = math.exp(prior.adapt[_PROCESS, 0] * alike / count)
+        bank.scale[_PROCESS, 0] = min(max(bank.scale[_PROCESS, 0] * step, _QUIET), _LOUD)
