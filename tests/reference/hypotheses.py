@@ -1,19 +1,26 @@
 """The multi-hypothesis filter by brute force: every account of a short series by least squares.
 
 An account says of every observation whether it belongs to the track, is wrong by itself, or is of
-a run with a common offset. Given the account all is linear and normal: the states of all epochs and
-the offsets of all runs are one joint vector, of which motion and observations give the information
-matrix. Positions at the beginning and offsets have no prior information at all. Axes are apart.
+a run with a common offset, that a manoeuvre came before it, or that the track begins anew.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
+from scipy.special import logsumexp
 
-from surefix.models.motion import noise_factor, transition
+from reference.account import (
+    Account,
+    agility,
+    cauchy,
+    moments,
+    normal,
+    put,
+    reach,
+    told,
+    wrap,
+)
 
-NAMES = {2: "cv", 3: "ca"}
 POOR = 4.0  # variances of a poor observation
 GROSS = 36.0
 STRANGE = 16.0
@@ -25,36 +32,6 @@ ANEW = 0.1
 HASTE = 2.0
 
 
-class Account(NamedTuple):
-    """One way it may have been.
-
-    Per axis: ``rows`` the used observations (step, component, offsets, value, variance),
-    ``offsets`` how many there are, ``lasting`` those that became jumps, ``open`` that of the run.
-    ``lost`` is when fixes began to be left out and how many were; ``rate`` what a velocity had been
-    before anything was seen; ``turns`` after which steps it changed at once, and by how much.
-    ``said`` is a word or two per epoch.
-    """
-
-    weight: float
-    rows: tuple
-    offsets: tuple
-    lasting: tuple
-    open: tuple
-    seen: tuple
-    began: float = np.nan
-    run: int = -1
-    opened: float = np.nan
-    length: int = 0
-    faulty: frozenset = frozenset()
-    slip: tuple = ()
-    lost: tuple = ()
-    rate: tuple = ()
-    turns: tuple = ()
-    touched: int = -1
-    moved: float = np.nan
-    said: tuple = ()
-
-
 class Mixture(NamedTuple):
     """What all accounts say together of one epoch: mean, sigma (states,) and the log-evidence."""
 
@@ -62,18 +39,6 @@ class Mixture(NamedTuple):
     sigma: np.ndarray
     evidence: float
     accounts: list
-
-
-def normal(nu, S):
-    """Log-density of a normal innovation."""
-    return -0.5 * (nu**2 / S + np.log(2.0 * np.pi * S))
-
-
-def cauchy(squares, scales):
-    """Log-density of a multivariate Cauchy: Student's t of one degree of freedom."""
-    d = len(squares)
-    constant = gammaln(0.5 * (1 + d)) - gammaln(0.5) - 0.5 * d * np.log(np.pi)
-    return constant - 0.5 * np.sum(np.log(scales)) - 0.5 * (1 + d) * np.log1p(np.sum(squares))
 
 
 def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None):
@@ -104,7 +69,7 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
                 continue
             many = []
             for account in accounts:
-                known = [_moments(motion, prior, steps, account, a) for a in range(d)]
+                known = [moments(motion, prior, steps, account, a) for a in range(d)]
                 many += branches(motion, prior, account, known, z, r, time, sensor, steps)
             accounts, gain = _kept(many, far)
             evidence += gain
@@ -129,9 +94,9 @@ def _united(motion, prior, steps, accounts, alike):
     """Let each account join the first one before it that says the same."""
     d, out = motion.axes, []
     for account in accounts:
-        known = [_moments(motion, prior, steps, account, a) for a in range(d)]
-        told = [(a, s) for a in range(d) for s in range(2) if s or account.seen[a]]
-        figures = [(known[a][0][s], known[a][1][s, s]) for a, s in told]
+        known = [moments(motion, prior, steps, account, a) for a in range(d)]
+        shown = [(a, s) for a in range(d) for s in range(2) if s or account.seen[a]]
+        figures = [(known[a][0][s], known[a][1][s, s]) for a, s in shown]
         offsets = [(m[-1], P[-1, -1]) for m, P in known if P[-1, -1] > 0.0]
         since = account.opened if account.run >= 0 else None
         key = (account.seen, account.run, since, account.faulty)
@@ -155,62 +120,6 @@ def _same(figures, offsets, others, their_offsets, alike):
     return ((other - m) ** 2 / P).sum() <= alike and (np.abs(ratio - 1.0) <= 0.05).all()
 
 
-def _joint(motion, prior, steps, account, a):
-    """Mean and covariance of the states of all steps and all offsets of one axis."""
-    n, count = motion.order, len(steps)
-    size = n * count + account.offsets[a]
-    information, vector = np.zeros((size, size)), np.zeros(size)
-    begun, speed = account.rate[a]
-    first = n * begun + np.arange(1, n)
-    information[first, first] = 1.0 / speed**2
-    if not account.seen[a]:
-        information[n * begun, n * begun] = 1.0  # anything: nothing that is asked for depends on it
-    before = np.arange(n * begun)
-    information[before, before] = 1.0  # likewise, of what was before the track began anew
-    for k in range(begun + 1, count):
-        dt = steps[k] - steps[k - 1]
-        G = noise_factor(NAMES[n], 1, dt, motion.density[a])
-        F = transition(NAMES[n], 1, dt)
-        turn = F[:, n - 1] * sum(sigma for step, sigma in account.turns[a] if step == k - 1)
-        Q = G @ G.T + np.outer(turn, turn)
-        rows = np.hstack([-F, np.eye(n)])
-        at = slice(n * (k - 1), n * (k + 1))
-        information[at, at] += rows.T @ np.linalg.solve(Q, rows)
-    for k, component, offsets, value, variance in account.rows[a]:
-        h = np.zeros(size)
-        h[n * k + component] = 1.0
-        h[[n * count + b for b in offsets]] = 1.0
-        information += np.outer(h, h) / variance
-        vector += h * value / variance
-    covariance = np.linalg.inv(information)
-    return covariance @ vector, covariance
-
-
-def _moments(motion, prior, steps, account, a):
-    """Mean and covariance of [p, v, (a), b] at the last step; b is nought outside of runs."""
-    n, count = motion.order, len(steps)
-    mean, covariance = _joint(motion, prior, steps, account, a)
-    T = np.zeros((n + 1, len(mean)))
-    T[np.arange(n), n * (count - 1) + np.arange(n)] = 1.0
-    T[0, [n * count + b for b in account.lasting[a]]] = 1.0
-    if account.open[a] is not None:
-        T[n, n * count + account.open[a]] = 1.0
-    return T @ mean, T @ covariance @ T.T
-
-
-def _wrap(nu, period):
-    return (nu + 0.5 * period) % period - 0.5 * period if period > 0.0 else nu
-
-
-def _told(account, gain, word, **changes):
-    said = (*account.said[:-1], (account.said[-1] + " " + word).strip())
-    return account._replace(weight=account.weight + gain, said=said, **changes)
-
-
-def _set(values, a, value):
-    return (*values[:a], value, *values[a + 1 :])
-
-
 def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     """Belongs, usual or poor, or is wrong."""
     d, step = motion.axes, len(steps) - 1
@@ -229,33 +138,31 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     rows, slip = account.rows, account.slip
     for a in seen:
         variance = r[d + a] * (POOR if poor > usual else 1.0)
-        rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
-        slip = _set(slip, a, nu[a])
+        rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
+        slip = put(slip, a, nu[a])
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty = account.faulty
     out = [
-        _told(
-            account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step, moved=time
-        ),
-        _told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
+        told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step, moved=time),
+        told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
     gap = time - steps[account.touched] if account.touched >= 0 else 0.0
     strange = sum(nu[a] ** 2 / S[a] for a in seen) > STRANGE
     if not strange or not gap > 0.0 or not prior.manoeuvre > 0.0:
         return out
-    far = _reach(motion.order, 1, gap)
-    free = np.array([(far * _agility(motion, a, gap)) ** 2 + S[a] for a in seen])
+    far = reach(motion.order, 1, gap)
+    free = np.array([(far * agility(motion, a, gap)) ** 2 + S[a] for a in seen])
     gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
     gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
     rows, turns = account.rows, account.turns
     for a in seen:
-        rows = _set(rows, a, (*rows[a], (step, 1, (), z[d + a], r[d + a])))
-        speed = max(_agility(motion, a, gap), HASTE * abs(nu[a]) / far)
-        turns = _set(turns, a, (*turns[a], (account.touched, speed)))
+        rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], r[d + a])))
+        speed = max(agility(motion, a, gap), HASTE * abs(nu[a]) / far)
+        turns = put(turns, a, (*turns[a], (account.touched, speed)))
     faulty = faulty - {sensor}
     return [
         *out,
-        _told(
+        told(
             account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=step, moved=time
         ),
     ]
@@ -267,7 +174,7 @@ def _use(account, z, variance, time, step, axes, period, known, *, running=False
     for a in np.flatnonzero(~np.isnan(z[: len(seen)])):
         since, count = lost[a]
         out = running or a not in axes
-        lost = _set(lost, a, (since if count else time, count + 1) if out else (np.nan, 0))
+        lost = put(lost, a, (since if count else time, count + 1) if out else (np.nan, 0))
     for a in axes:
         offsets = account.lasting[a]
         if running and account.open[a] is not None:
@@ -275,9 +182,9 @@ def _use(account, z, variance, time, step, axes, period, known, *, running=False
         value = z[a]
         if seen[a]:  # the turn that lies nearest
             centre = known[a][0][0] + (known[a][0][-1] if running else 0.0)
-            value = centre + _wrap(z[a] - centre, period)
-        rows = _set(rows, a, (*rows[a], (step, 0, offsets, value, variance[a])))
-        seen = _set(seen, a, True)
+            value = centre + wrap(z[a] - centre, period)
+        rows = put(rows, a, (*rows[a], (step, 0, offsets, value, variance[a])))
+        seen = put(seen, a, True)
     new = any(seen) and np.isnan(account.began)
     began = time if new else account.began
     touched = step if len(axes) else account.touched
@@ -295,14 +202,14 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
             square[a], wide[a] = 1.0, prior.spread[a] ** 2 + r[a]
             inside[a] = cauchy(np.ones(1), np.array([wide[a]]))
             continue
-        nu, S = _wrap(z[a] - m[0], period), P[0, 0] + r[a]
+        nu, S = wrap(z[a] - m[0], period), P[0, 0] + r[a]
         inside[a] = normal(nu, S)
         poor += normal(nu, S + (POOR - 1.0) * r[a])
         distance += nu**2 / S
         wide[a] = prior.spread[a] ** 2 + S
         square[a] = nu**2 / wide[a]
         h = np.eye(len(m))[0] + np.eye(len(m))[-1]
-        shifted += normal(_wrap(z[a] - h @ m, period), h @ P @ h + r[a])
+        shifted += normal(wrap(z[a] - h @ m, period), h @ P @ h + r[a])
     unknown = not all(account.seen[a] for a in axes)
     belongs = sum(inside.values())
     own, running = account.run == sensor, account.run >= 0
@@ -314,14 +221,14 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         return _use(base, z, variance, time, step, some, period, known, **how)
 
     over = {"run": -1, "open": (None,) * d}
-    out = [_told(used(account, []), wild(axes) + np.log(prior.isolated), "isolated")]
+    out = [told(used(account, []), wild(axes) + np.log(prior.isolated), "isolated")]
     if own:
         ended = used(account._replace(**over), axes)
-        out.append(_told(ended, belongs + np.log(prior.ending), "drop"))
+        out.append(told(ended, belongs + np.log(prior.ending), "drop"))
         if not unknown:
             gain = shifted + np.log(1.0 - prior.isolated - prior.ending)
             more = used(account, axes, running=True)._replace(length=account.length + 1)
-            out.append(_told(more, gain, "continue"))
+            out.append(told(more, gain, "continue"))
     else:
         usual, noisy = belongs + np.log(1.0 - prior.poor), poor + np.log(prior.poor)
         gain = belongs if unknown else np.logaddexp(usual, noisy)
@@ -330,55 +237,45 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         good = used(account, axes, POOR * r if is_poor else r)
         if running and not unknown and belongs - shifted > PREFERS:
             good = good._replace(opened=time)  # the run is not a jump, up to now
-        out.append(_told(good, gain, "poor" if is_poor else "belongs"))
+        out.append(told(good, gain, "poor" if is_poor else "belongs"))
         out += _partial(prior, account, axes, inside, wild, used)
         confirmed = running and not unknown and account.length >= CONFIRMED
         if confirmed and shifted - belongs > PREFERS:
-            out.append(_told(used(_jumped(account), axes), shifted + np.log(prior.burst), "commit"))
+            out.append(told(used(_jumped(account), axes), shifted + np.log(prior.burst), "commit"))
     if distance > GROSS and not unknown and (own or not running):
         new, offsets = (None,) * d, account.offsets
         for a in axes:
-            new = _set(new, a, offsets[a])
-            offsets = _set(offsets, a, offsets[a] + 1)
+            new = put(new, a, offsets[a])
+            offsets = put(offsets, a, offsets[a] + 1)
         begun = account._replace(open=new, offsets=offsets, run=sensor, opened=time, length=1)
         known = [(np.append(m[:-1], 0.0), P) for m, P in known]
         begun = _use(begun, z, r, time, step, axes, period, known, running=True)
-        out.append(_told(begun, wild(axes) + np.log(prior.burst), "open"))
+        out.append(told(begun, wild(axes) + np.log(prior.burst), "open"))
     touched = account.touched
     gap = time - steps[touched] if touched >= 0 else 0.0
     if distance > STRANGE and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
-        far = _reach(motion.order, 0, gap)
+        far = reach(motion.order, 0, gap)
         free = np.array(
-            [(far * _agility(motion, a, gap)) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
+            [(far * agility(motion, a, gap)) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
         )
-        off = {a: _wrap(z[a] - known[a][0][0], period) for a in axes}
+        off = {a: wrap(z[a] - known[a][0][0], period) for a in axes}
         gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
         turns = account.turns
         for a in axes:
-            speed = max(_agility(motion, a, gap), HASTE * abs(off[a]) / far)
-            turns = _set(turns, a, (*turns[a], (touched, speed)))
-        out.append(_told(used(account._replace(turns=turns), axes), gain, "turns"))
+            speed = max(agility(motion, a, gap), HASTE * abs(off[a]) / far)
+            turns = put(turns, a, (*turns[a], (touched, speed)))
+        out.append(told(used(account._replace(turns=turns), axes), gain, "turns"))
     due = [a for a in axes if account.seen[a] and _due(prior, account, a, time)]
     if due and (due == axes or not own):
         fresh = account
         for a in due:
-            far = abs(_wrap(z[a] - known[a][0][0], period)) / (time - account.lost[a][0])
+            far = abs(wrap(z[a] - known[a][0][0], period)) / (time - account.lost[a][0])
             fresh = _forgotten(fresh, a, step, max(prior.sigma_velocity, HASTE * far))
         gain = np.log(ANEW) + sum(inside[a] for a in axes if a not in due)
         gain += sum(cauchy(np.ones(1), np.array([prior.spread[a] ** 2 + r[a]])) for a in due)
         fresh = used(fresh._replace(**over, began=time), axes)
-        out.append(_told(fresh, gain, "anew"))
+        out.append(told(fresh, gain, "anew"))
     return out
-
-
-def _reach(order, component, gap):
-    """What a unit of the highest rate does to a component in a time."""
-    return transition(NAMES[order], 1, gap)[component, order - 1]
-
-
-def _agility(motion, a, gap):
-    """Scale of a change of the highest rate."""
-    return 30.0 * np.sqrt(motion.density[a] * gap)
 
 
 def _due(prior, account, a, time):
@@ -391,12 +288,12 @@ def _due(prior, account, a, time):
 def _forgotten(account, a, step, speed):
     """Nothing is known of an axis but that its rates are about nought."""
     return account._replace(
-        rows=_set(account.rows, a, ()),
-        offsets=_set(account.offsets, a, 0),
-        lasting=_set(account.lasting, a, ()),
-        seen=_set(account.seen, a, False),
-        rate=_set(account.rate, a, (step, speed)),
-        turns=_set(account.turns, a, ()),
+        rows=put(account.rows, a, ()),
+        offsets=put(account.offsets, a, 0),
+        lasting=put(account.lasting, a, ()),
+        seen=put(account.seen, a, False),
+        rate=put(account.rate, a, (step, speed)),
+        turns=put(account.turns, a, ()),
     )
 
 
@@ -410,7 +307,7 @@ def _partial(prior, account, axes, inside, wild, used):
     for some in wrong:
         rest = [a for a in axes if a not in some]
         gain = share + sum(inside[a] for a in rest) + wild(some)
-        out.append(_told(used(account, rest), gain, "off" + "".join("xyz"[a] for a in some)))
+        out.append(told(used(account, rest), gain, "off" + "".join("xyz"[a] for a in some)))
     return out
 
 
@@ -429,7 +326,7 @@ def _lasting(prior, account, time):
         return account
     if time - account.opened < min(prior.longest, account.opened - account.began):
         return account
-    return _told(_jumped(account), 0.0, "lasting")
+    return told(_jumped(account), 0.0, "lasting")
 
 
 def _mixture(motion, prior, steps, accounts, evidence):
@@ -440,17 +337,17 @@ def _mixture(motion, prior, steps, accounts, evidence):
     accounts = [each for each in accounts if each is likeliest or "turns" not in each.said[-1]]
     mean, sigma = np.full(order * d, np.nan), np.full(order * d, np.nan)
     for a in range(d):
-        known = [_moments(motion, prior, steps, account, a) for account in accounts]
+        known = [moments(motion, prior, steps, account, a) for account in accounts]
         weight = np.exp([account.weight for account in accounts])
-        told = np.array([account.seen[a] for account in accounts])
+        aware = np.array([account.seen[a] for account in accounts])
         for s in range(order):
-            w = weight * told if s == 0 else weight
+            w = weight * aware if s == 0 else weight
             if not w.any():
                 continue
             w = w / w.sum()
             m, P = np.array([(each[0][s], each[1][s, s]) for each in known]).T
             centre = m[np.argmax(w)]
-            gap = _wrap(m - centre, motion.period) if s == 0 else m - centre
+            gap = wrap(m - centre, motion.period) if s == 0 else m - centre
             mean[s * d + a] = centre + w @ gap
             sigma[s * d + a] = np.sqrt(w @ P + w @ gap**2 - (w @ gap) ** 2)
     return Mixture(mean, sigma, evidence, whole)

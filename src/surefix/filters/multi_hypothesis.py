@@ -56,7 +56,7 @@ from surefix.filters.hypothesis_branches import (
 )
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.records import Epochs, Motion
-from surefix.filters.track_step import VAGUE_RATE
+from surefix.filters.track_predict import VAGUE_RATE
 from surefix.jit import helper, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 

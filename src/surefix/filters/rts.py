@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.filters.records import Filtered, Motion, Recovery
-from surefix.filters.track_step import predict_factor
+from surefix.filters.track_predict import predict_factor
 from surefix.jit import helper, kernel
 from surefix.linalg import triangularize
 from surefix.models.motion import propagate_rows

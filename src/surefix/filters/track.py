@@ -15,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.filters.records import Epochs, Filtered, Motion, Recovery, TrackState
-from surefix.filters.track_step import RECENT, VAGUE, run
+from surefix.filters.track_predict import VAGUE
+from surefix.filters.track_step import RECENT, run
 from surefix.robust.loss import Loss
 from surefix.types import IntArray
 
