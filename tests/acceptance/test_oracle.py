@@ -1,0 +1,53 @@
+"""The default against an oracle that knows every fault, in worlds it was not tuned on.
+
+Noise of 0.05 … 5 m, 0.2 … 20 fixes a second, and how nimbly the vehicle moves are drawn for each
+row of the table by a seed that no constant was chosen with. Nothing is told but the log.
+"""
+
+import pytest
+
+from surefix.comparison.run import outcomes
+from surefix.simulate.contamination import alone, draw, draw_world
+
+SEED = 20_261_122
+EPOCHS = 1200
+METHOD = "multi-hypothesis"
+# RMSE over that of the oracle: offline, and in real time with velocities and without
+ISOLATED = 1.03, 1.03, 1.08
+BURST = 1.03, 1.04, 1.7
+FAULTS = 1.04, 1.06, 1.06
+ROWS = {
+    "clean": ISOLATED,
+    "isolated-5": ISOLATED,
+    "isolated-20": ISOLATED,
+    "isolated-40": ISOLATED,
+    "burst-common": BURST,
+    "burst-independent": BURST,
+    "jump": (1.03, 1.05, 1.05),  # in real time once it is back
+    "one-axis": FAULTS,
+    "first-bad": FAULTS,
+    "student-t3": FAULTS,
+}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_it_stays_beside_the_oracle(name):
+    number = list(ROWS).index(name)
+    trial = draw(name, draw_world((SEED, number), epochs=EPOCHS), (SEED, number))
+    bounds = ROWS[name]
+    for kind, log in (("aided", trial), ("alone", alone(trial))):
+        found = outcomes(log, [METHOD], ["offline", "realtime"])
+        for mode in ("offline", "realtime"):
+            merit = found[mode, METHOD].merit
+            at_most = bounds[0] if mode == "offline" else bounds[1 if kind == "aided" else 2]
+            assert merit.rmse_ratio < at_most, (kind, mode)
+            assert 0.7 < merit.nees < 1.4, (kind, mode)
+            assert merit.rejected_good_pct < (2.0 if name == "student-t3" else 0.4), (kind, mode)
+            if mode == "offline" and name not in ("clean", "student-t3"):
+                assert merit.rejected_gross_pct > 99.8, (kind, mode)
+            if name == "jump" and mode == "realtime":
+                assert merit.back_fixes <= 41, kind
+            if name.startswith(("clean", "isolated")) and mode == "offline":
+                assert merit.noise_position == pytest.approx(1.0, abs=0.1), kind
+                if kind == "aided":
+                    assert merit.noise_velocity == pytest.approx(1.0, abs=0.1)
