@@ -89,7 +89,8 @@ def clean(
         ]
         | None,
         typer.Option(
-            help="Several hypotheses, one with a robust loss, or a cleaner before it; default multi-hypothesis."
+            help="Several hypotheses, one with a robust loss, or a cleaner before it; "
+            "default multi-hypothesis."
         ),
     ] = None,
     model: Annotated[
