@@ -57,7 +57,8 @@ def test_runs_and_jumps_are_told_beside_sensors_that_come_between(mode):
         options=sf.CleanOptions(mode=mode),
     )
     told = [(event.kind, event.time - 1.7e9) for event in found.events]
-    assert [time for kind, time in told if kind == "run"][0] == (502 if mode == "realtime" else 500)
+    first = next(time for kind, time in told if kind == "run")
+    assert first == (502.0 if mode == "realtime" else 500.0)
     assert (found.verdicts.detail[510:517] >= 10.0).all()
     assert (found.verdicts.reason == sf.Reason.JUMP).sum() == 1
     ((_, jump),) = [each for each in told if each[0] == "jump"]
