@@ -108,7 +108,8 @@ def clean(
     recovery: Annotated[
         str | None,
         typer.Option(
-            metavar="DURATION", help="Rejection on end after which a sensor is believed again."
+            metavar="DURATION",
+            help="Longest run of wrong fixes that is survived; a longer one is taken for a jump.",
         ),
     ] = None,
     sigma_position: Annotated[

@@ -150,8 +150,9 @@ class Event(NamedTuple):
     Parameters
     ----------
     kind
-        ``gap``, ``clock-step``, ``misdated``, ``week-rollover``, ``jump``, ``held``, ``idle-axis``,
-        ``height-offset`` or ``note``.
+        ``gap``, ``clock-step``, ``misdated``, ``week-rollover``, ``jump``, ``run``,
+        ``sensor-suspect``, ``sensor-trusted``, ``noise-changed``, ``held``, ``idle-axis``,
+        ``height-offset``, ``latency`` or ``note``.
     time
         s on the output's clock; NaN where it concerns the whole log.
     text

@@ -3,10 +3,11 @@ import re
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surefix.cleaning.duplicates import constant_axes, find_repeats, start_repeats
+from surefix.cleaning.duplicates import constant_axes, find_repeats, idle_axes, start_repeats
 
 
 def find(time, fields, sensor=None, cuts=(), axes=2):
@@ -120,7 +121,7 @@ def test_the_result_does_not_depend_on_the_chunks(moves, sensor, cuts):
         assert np.array_equal(one, two, equal_nan=True)
 
 
-def test_an_idle_axis_is_found():
+def test_a_constant_axis_is_found():
     position = np.column_stack((fine_walk(12), np.zeros(12)))
     sensor = np.zeros(12, dtype=np.int64)
     assert constant_axes(position, sensor, 2).tolist() == [[False] * 2 + [True], [False] * 3]
@@ -128,6 +129,33 @@ def test_an_idle_axis_is_found():
     assert not constant_axes(np.ones((20, 3)), np.zeros(20, dtype=np.int64), 1).any()
     position[:, 2] = np.nan
     assert not constant_axes(position, sensor, 1).any()
+
+
+@pytest.mark.parametrize(
+    ("constant", "metric", "degrees"),
+    [
+        ({2: 0.0}, [2], [2]),
+        ({2: -85.0}, [2], [2]),  # a height that is not measured
+        ({0: 0.0}, [0], []),  # half a geographic position is no missing one
+        ({0: 36.7}, [], []),  # along a meridian, a quay or the axis of a basin
+        ({1: 36.7, 2: 0.0}, [2], [2]),
+        ({0: 0.0, 1: 0.0}, [0, 1], [0, 1]),  # zeros in the place of nothing
+        ({0: 36.7, 1: -122.1}, [], []),  # at rest
+        ({0: 36.7, 1: 0.0}, [1], []),
+    ],
+    ids=str,
+)
+def test_an_idle_axis_is_one_that_nobody_measured(constant, metric, degrees):
+    position = np.column_stack((fine_walk(12), fine_walk(12)[:, 0]))
+    for axis, value in constant.items():
+        position[:, axis] = value
+    sensor = np.zeros(12, dtype=np.int64)
+    for geographic, axes in ((False, metric), (True, degrees)):
+        idle = idle_axes(position, sensor, 2, geographic=geographic)
+        assert np.flatnonzero(idle[0]).tolist() == axes
+        assert not idle[1].any()
+    position[3, 0] = np.nan
+    assert np.flatnonzero(idle_axes(position, sensor, 1, geographic=False)).tolist() == metric
 
 
 def columns(path, *names):
@@ -162,7 +190,7 @@ def test_real_dive_log_is_polled_although_its_digits_are_coarse(data):
 def test_real_survey_with_an_idle_altitude(data):
     path = data / "usbl_mbari" / "oi_survey_1648_USBL_WINFROG.csv"
     place = columns(path, "latitude", "longitude", "altitude")
-    idle = constant_axes(place, np.zeros(len(place), dtype=np.int64), 1)
+    idle = idle_axes(place, np.zeros(len(place), dtype=np.int64), 1, geographic=True)
     assert idle.tolist() == [[False, False, True]]
 
 

@@ -106,7 +106,7 @@ def test_json_agrees_with_the_file(log, tmp_path):
     speed = np.hypot(track.vx, track.vy)
     assert told["speed_mps"]["clean"]["max"] == pytest.approx(speed.max(), abs=1e-3)
     assert told["settings"]["mode"] == "offline"
-    assert told["settings"]["method"] == "igg3"
+    assert told["settings"]["method"] == "multi-hypothesis"
     assert {n["quantity"] for n in told["noise"]} >= {"position", "height"}
 
 

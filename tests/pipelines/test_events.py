@@ -39,6 +39,33 @@ def test_a_run_is_told_with_its_offset(mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
+def test_runs_and_jumps_are_told_beside_sensors_that_come_between(mode):
+    """A depth and a velocity neither end a run nor keep a jump to themselves."""
+    t, fixes = dive()
+    fixes[500:517] += [14.0, -27.0]
+    fixes[800:] += [15.0, -9.0]
+    rng = np.random.default_rng(9)
+    fast = np.arange(0.0, t[-1], 0.45)
+    found = sf.clean(
+        {"time": 1.7e9 + t, "x": fixes[:, 0], "y": fixes[:, 1], "z": rng.normal(-50, 0.4, len(t))},
+        depth={"time": 1.7e9 + fast, "depth": 50.0 + rng.normal(0.0, 0.02, len(fast))},
+        velocity={
+            "time": 1.7e9 + fast + 0.1,
+            "ve": 0.5 + np.cos(fast / 60.0) / 12.0 + rng.normal(0.0, 0.02, len(fast)),
+            "vn": 0.2 + rng.normal(0.0, 0.02, len(fast)),
+        },
+        options=sf.CleanOptions(mode=mode),
+    )
+    told = [(event.kind, event.time - 1.7e9) for event in found.events]
+    first = next(time for kind, time in told if kind == "run")
+    assert first == (502.0 if mode == "realtime" else 500.0)
+    assert (found.verdicts.detail[510:517] >= 10.0).all()
+    assert (found.verdicts.reason == sf.Reason.JUMP).sum() == 1
+    ((_, jump),) = [each for each in told if each[0] == "jump"]
+    assert jump == 800.0 if mode == "offline" else 800.0 <= jump < 860.0
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_a_log_of_isolated_errors_has_no_such_events(mode):
     t, fixes = dive(2)
     bad = np.random.default_rng(5).random(len(t)) < 0.1

@@ -1,5 +1,6 @@
 import base64
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from surefix.report.encode import dumps
 from surefix.report.headline import headline
 from surefix.report.marks import clock_of, drawn
 from surefix.report.plan import swept
+from surefix.report.tables import worst_table
 from surefix.report.thin import breaks, extremes, outline, pieces, view
 from surefix.types import Verdict
 
@@ -103,3 +105,15 @@ def test_headline_figures_of_a_straight_track() -> None:
     assert head.clean_speed == pytest.approx((np.hypot(0.5, 0.3),) * 2)
     assert head.raw_speed[1] > 15.0
     assert head.sigma_horizontal == pytest.approx(0.4)
+
+
+def test_the_worst_fixes_have_the_depth_that_was_given() -> None:
+    result = cleaned(*straight(200))
+    clock = clock_of(result.track.time)
+    result.raw_coordinates[:, 2] -= 85.0
+    depth = worst_table(replace(result, has_depth=True), clock)
+    height = worst_table(result, clock)
+    assert "Depth, m" in depth
+    assert "Height, m" in height
+    assert ">-8" in height
+    assert ">-8" not in depth

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "start_repeats"]
+__all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "idle_axes", "start_repeats"]
 
 _GRAINS = 4.0  # a hold is believed where positions usually change by at least so many grains
 _COPIES = 10  # copies on end that are believed to be held; a vessel may have come to rest
@@ -117,7 +117,7 @@ def find_repeats(
 
 
 def constant_axes(position: FloatArray, sensor: IntArray, sensors: int) -> BoolArray:
-    """Find axes that carry no information: constant over a head of the log while others vary.
+    """Find axes that say nothing of the noise: constant over a head of the log while others vary.
 
     Parameters
     ----------
@@ -142,6 +142,35 @@ def constant_axes(position: FloatArray, sensor: IntArray, sensors: int) -> BoolA
         high = np.max(own, axis=0, initial=-np.inf, where=np.isfinite(own))
         constant[index] = (known >= _IDLE_MIN) & (low == high) & (low < high).any()
     return constant
+
+
+def idle_axes(
+    position: FloatArray, sensor: IntArray, sensors: int, *, geographic: bool
+) -> BoolArray:
+    """Find constant axes that nobody measured: the vertical one, or a column of zeros.
+
+    A vehicle may well keep to one meridian of coarse digits, and half a latitude and longitude is
+    no place: only both together can be zeros that stand for nothing.
+
+    Parameters
+    ----------
+    position, sensor, sensors
+        As for `constant_axes`; d = 3, and the last axis is the vertical one.
+    geographic
+        Whether the first two are latitude and longitude.
+
+    Returns
+    -------
+    idle
+        (sensors, 3) True where an axis is to be left out.
+    """
+    idle = constant_axes(position, sensor, sensors)
+    for index in range(sensors):
+        own = position[sensor == index, :2]
+        idle[index, :2] &= ((own == 0.0) | np.isnan(own)).all(axis=0)
+    if geographic:
+        idle[:, :2] &= idle[:, :2].all(axis=1, keepdims=True)
+    return idle
 
 
 def _learn(position: FloatArray) -> _Sensor:

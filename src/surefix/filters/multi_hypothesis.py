@@ -145,8 +145,13 @@ def _close_ranks(
 
 
 @helper
-def _judge(motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, out: Found) -> int:
-    """Probabilities of the components of epoch k, and what the best hypothesis says of runs."""
+def _judge(
+    motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, fix: bool, out: Found
+) -> int:
+    """Probabilities of the components of epoch k, and what the best hypothesis says of runs.
+
+    A jump is told with a ``fix``, of which the leading axis is seen, and not with a depth.
+    """
     d = motion.axes
     for i in range(bank.number[0]):
         w = math.exp(bank.weight[i])
@@ -164,7 +169,7 @@ def _judge(motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, out
         for a in range(d):
             out.offset[k, a] = bank.mean[best, a, motion.order]
     began = bank.began[best]
-    if not math.isnan(began):
+    if fix and not math.isnan(began):
         if began > bank.announced[0] + 0.5 * prior.longest:
             out.since[k] = began
         if not began <= bank.announced[0]:
@@ -251,7 +256,7 @@ def _run(
         _commit_lasting(motion, prior, one, time, said)
         if one.number[0] > 1:
             one.number[0] = _close_ranks(motion, one, keep, origin, said)
-        best = _judge(motion, prior, one, k, said, found)
+        best = _judge(motion, prior, one, k, said, not math.isnan(z[0]), found)
         if adapting:
             adapt(motion, prior, one, k, sensor, share, found)
         if traced:

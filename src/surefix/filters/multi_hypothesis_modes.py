@@ -208,8 +208,8 @@ def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> 
     seen = np.isfinite(epochs.z[:, : motion.axes])
     used = np.where(seen, said.fixed[:, : motion.axes], np.nan)
     bits = ((said.jump[:, None] >> np.arange(motion.groups)) & 1).astype(np.bool_)
-    since: FloatArray = np.where(bits, epochs.time[:, None], np.nan)
-    length, run = runs(np.where(seen.any(axis=1), said.run, 0), used)
+    since = _with_fixes(np.where(bits, epochs.time[:, None], np.nan), seen[:, 0])
+    length, run = _runs(np.where(seen.any(axis=1), said.run, 0), used, epochs.sensor)
     off = epochs.z[:, : motion.axes] - whole.mean[:, : motion.axes]
     if motion.period > 0.0:
         off -= motion.period * np.rint(off / motion.period)
@@ -221,3 +221,25 @@ def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> 
         inside = known & (count[run] > 0)
         offset[inside, a] = total[run[inside]] / count[run[inside]]
     return whole._replace(jump=said.jump, since=since, run=length, offset=offset)
+
+
+def _with_fixes(since: FloatArray, fix: BoolArray) -> FloatArray:
+    """Let a jump that was found with a depth or a velocity be told with the next fix."""
+    fixes = np.flatnonzero(fix)
+    for k in np.flatnonzero(np.isfinite(since).any(axis=1) & ~fix):
+        after = fixes[np.searchsorted(fixes, k) :][:1]
+        since[after] = np.fmin(since[after], since[k])
+        since[k] = np.where(len(after), np.nan, since[k])
+    return since
+
+
+def _runs(run: IntArray, used: FloatArray, sensor: IntArray) -> tuple[IntArray, IntArray]:
+    """Length and number of the runs sensor by sensor: another one does not end a run."""
+    if not len(sensor):
+        return runs(run, used)
+    length, number = np.zeros_like(run), np.full_like(run, -1)
+    for own in np.unique(sensor[run > 0]):
+        mine = np.flatnonzero(sensor == own)
+        length[mine], told = runs(run[mine], used[mine])
+        number[mine[told >= 0]] = told[told >= 0] + number.max() + 1
+    return length, number

@@ -14,8 +14,8 @@ import numpy as np
 from surefix.cleaning.duplicates import (
     Repeats,
     RepeatState,
-    constant_axes,
     find_repeats,
+    idle_axes,
     start_repeats,
 )
 from surefix.errors import InputError
@@ -222,7 +222,7 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
             return _clean_rows(_without_delay(session, delayed), rows, events)
         if setup.axes:
             session.filter = begin(options, setup.motion, setup.recovery, setup.prior)
-        events += [*setup.events, *_idle_events(session)]
+        events += [*setup.events, *_idle_events(session, geographic=rows.fixes.geographic)]
     position, velocity = localise(used, setup.frame, setup.origin)
     offset = padded(setup.height_offset, len(session.sensors))[rows.fixes.sensor]
     position[:, 2] -= np.where(rows.auxiliary, 0.0, offset)
@@ -320,7 +320,9 @@ def _repeats(session: _Session, rows: Rows) -> Repeats:
         again = np.diff(rows.tau, prepend=np.nan) == 0.0
         positions = np.where(again[:, None], np.nan, fixes.position)
         session.repeats = start_repeats(positions[head], fixes.sensor[head], sensors)
-        session.idle = constant_axes(fixes.position[head], fixes.sensor[head], sensors)
+        session.idle = idle_axes(
+            fixes.position[head], fixes.sensor[head], sensors, geographic=fixes.geographic
+        )
     recorded = np.hstack([fixes.position, fixes.velocity])
     repeats, session.repeats = find_repeats(rows.tau, recorded, fixes.sensor, session.repeats)
     return repeats
@@ -340,14 +342,15 @@ def _without_idle(session: _Session, rows: Rows) -> Rows:
     return rows._replace(fixes=rows.fixes._replace(position=position))
 
 
-def _idle_events(session: _Session) -> list[Event]:
+def _idle_events(session: _Session, *, geographic: bool) -> list[Event]:
     if session.idle is None:
         return []
+    names = ("latitude", "longitude", "height") if geographic else ("axis x", "axis y", "axis z")
     return [
         Event(
             "idle-axis",
             np.nan,
-            f"axis {'xyz'[axis]} of {session.sensors[sensor]} never changes; left out",
+            f"{names[axis]} of {session.sensors[sensor]} never changes; left out",
         )
         for sensor, axis in zip(*np.nonzero(session.idle), strict=True)
     ]

@@ -91,15 +91,16 @@ def sensor_events(
     health, what, figure = watch(health, sensor[rows], out, square)
     events = []
     for i in np.flatnonzero(what).tolist():
-        name = sensors[sensor[rows[i]]]
+        name, at = sensors[sensor[rows[i]]], float(time[rows[i]])
         if what[i] == SUSPECT:
-            kind, text = "sensor-suspect", f"{figure[i]:.0%} of the last fixes of {name} rejected"
+            text = f"{figure[i]:.0%} of the last fixes of {name} rejected"
+            events.append(Event("sensor-suspect", at, text))
         elif what[i] == TRUSTED:
-            kind, text = "sensor-trusted", f"the fixes of {name} agree with the track again"
+            text = f"the fixes of {name} agree with the track again"
+            events.append(Event("sensor-trusted", at, text))
         else:
-            kind = "noise-changed"
             text = f"the noise of {name} is {figure[i]:.2g} × what was settled"
-        events.append(Event(kind, float(time[rows[i]]), text))
+            events.append(Event("noise-changed", at, text))
     return events, health
 
 

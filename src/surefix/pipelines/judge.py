@@ -163,7 +163,7 @@ def verdicts(
         part = low.any(axis=1) & ~low.all(axis=1) & (np.isfinite(weight).sum(axis=1) > 1)
         reason[part] = Reason.AXIS_OFF
         detail[part] = (low[part] * _bits(axes, apart)).sum(axis=1)
-    run = (found.run > 0) & (verdict == Verdict.REJECTED)
+    run = (found.run > 1) & (verdict == Verdict.REJECTED)
     reason[run], detail[run] = Reason.RUN, found.run[run]
     since = found.since[:, :groups]
     jumped = np.isfinite(since).any(axis=1)

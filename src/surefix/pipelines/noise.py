@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.cleaning.duplicates import constant_axes
 from surefix.filters.hypotheses import MOST_SENSORS, Prior
 from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
-from surefix.types import FloatArray, Noise
+from surefix.types import BoolArray, FloatArray, Noise
 
 __all__ = ["Figures", "settle_noise"]
 
@@ -125,7 +126,8 @@ def _blocks(
         declared = np.hstack(
             [rows.fixes.sigma_position[:, block], rows.fixes.sigma_velocity[:, block]]
         )
-        z = np.hstack([position[:, block], velocity[:, block]])
+        still = _still(rows, block, len(sensors))
+        z = np.hstack([np.where(still, np.nan, position[:, block]), velocity[:, block]])
         known = np.isfinite(rows.tau) & np.isfinite(z).any(axis=1)
         observations = Observations(
             rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
@@ -209,6 +211,14 @@ def _given(options: CleanOptions, sensors: list[str], rows: Rows, vertical: bool
         elif own is not None:
             velocity[i] = own
     return NoiseFigures(position, velocity, options.process or np.nan)
+
+
+def _still(rows: Rows, block: list[int], sensors: int) -> BoolArray:
+    """Positions of a sensor along an axis whose digits never change, while those beside it do."""
+    axes = rows.fixes.position[:, block]
+    if rows.fixes.geographic and len(block) == 2:
+        axes = axes[:, ::-1]  # latitude comes first there, east here
+    return np.asarray(constant_axes(axes, rows.fixes.sensor, sensors)[rows.fixes.sensor])
 
 
 def _quantum(rows: Rows, block: list[int]) -> float:

@@ -134,7 +134,8 @@ class CleanOptions:
                 "mode lagged or offline",
                 "method median decides from the past",
             )
-        _number("false_alarm", self.false_alarm)
+        if not 0.0 < _number("false_alarm", self.false_alarm) < 1.0:
+            raise OptionsError(f"false_alarm = {self.false_alarm}", "a share between 0 and 1")
         if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
         if not isinstance(self.held, bool):

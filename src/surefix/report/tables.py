@@ -119,7 +119,9 @@ def _coordinates(cleaned: Cleaned) -> dict[str, tuple[FloatArray, int]]:
         kinds = [("Latitude#", 6), ("Longitude#", 6), (vertical, 2)]
     else:
         kinds = [("x, m#", 2), ("y, m#", 2), (vertical, 2)]
-    columns = cleaned.raw_coordinates.T
+    columns = cleaned.raw_coordinates.T * np.array(
+        [[1.0], [1.0], [-1.0 if cleaned.has_depth else 1.0]]
+    )
     return {
         name: (values, digits)
         for (name, digits), values in zip(kinds, columns, strict=True)
