@@ -40,7 +40,7 @@ class Account(NamedTuple):
     lost: tuple = ()
     rate: tuple = ()
     turns: tuple = ()
-    touched: int = -1
+    touched: tuple = ()
     moved: float = np.nan
     said: tuple = ()
 

@@ -52,7 +52,10 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
     d, none = motion.axes, ((),) * motion.axes
     empty = Account(0.0, none, (0,) * d, none, (None,) * d, (False,) * d, slip=(0.0,) * d)
     empty = empty._replace(
-        lost=((np.nan, 0),) * d, rate=((0, prior.sigma_velocity),) * d, turns=none
+        lost=((np.nan, 0),) * d,
+        rate=((0, prior.sigma_velocity),) * d,
+        turns=none,
+        touched=(-1,) * d,
     )
     accounts, out, steps = [empty], [], []
     later = prior
@@ -141,29 +144,34 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
         rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
         slip = put(slip, a, nu[a])
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
-    faulty = account.faulty
+    faulty, touched = account.faulty, account.touched
+    for a in seen:
+        touched = put(touched, a, step)
     out = [
-        told(account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=step, moved=time),
+        told(
+            account, gain, "moves", rows=rows, faulty=faulty - {sensor}, touched=touched, moved=time
+        ),
         told(account, outside + np.log(wrong), "slips", faulty=faulty | {sensor}, slip=slip),
     ]
-    gap = time - steps[account.touched] if account.touched >= 0 else 0.0
+    gaps = {a: _gap(account, steps, time, a) for a in seen}
     strange = sum(nu[a] ** 2 / S[a] for a in seen) > STRANGE
-    if not strange or not gap > 0.0 or not prior.manoeuvre > 0.0:
+    if not strange or not max(gaps.values()) > 0.0 or not prior.manoeuvre > 0.0:
         return out
-    far = reach(motion.order, 1, gap)
-    free = np.array([(far * agility(motion, a, gap)) ** 2 + S[a] for a in seen])
+    far = {a: reach(motion.order, 1, gaps[a]) for a in seen}
+    free = np.array([(far[a] * agility(motion, a, gaps[a])) ** 2 + S[a] for a in seen])
     gain = cauchy(np.array([nu[a] for a in seen]) ** 2 / free, free)
     gain += np.log(prior.manoeuvre) + np.log(1.0 - wrong)
     rows, turns = account.rows, account.turns
     for a in seen:
         rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], r[d + a])))
-        speed = max(agility(motion, a, gap), HASTE * abs(nu[a]) / far)
-        turns = put(turns, a, (*turns[a], (account.touched, speed)))
+        if gaps[a] > 0.0:
+            speed = max(agility(motion, a, gaps[a]), HASTE * abs(nu[a]) / far[a])
+            turns = put(turns, a, (*turns[a], (account.touched[a], speed)))
     faulty = faulty - {sensor}
     return [
         *out,
         told(
-            account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=step, moved=time
+            account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=touched, moved=time
         ),
     ]
 
@@ -187,7 +195,9 @@ def _use(account, z, variance, time, step, axes, period, known, *, running=False
         seen = put(seen, a, True)
     new = any(seen) and np.isnan(account.began)
     began = time if new else account.began
-    touched = step if len(axes) else account.touched
+    touched = account.touched
+    for a in axes:
+        touched = put(touched, a, step)
     return account._replace(rows=rows, seen=seen, lost=lost, began=began, touched=touched)
 
 
@@ -251,19 +261,19 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         known = [(np.append(m[:-1], 0.0), P) for m, P in known]
         begun = _use(begun, z, r, time, step, axes, period, known, running=True)
         out.append(told(begun, wild(axes) + np.log(prior.burst), "open"))
-    touched = account.touched
-    gap = time - steps[touched] if touched >= 0 else 0.0
-    if distance > STRANGE and not unknown and gap > 0.0 and not own and prior.manoeuvre > 0.0:
-        far = reach(motion.order, 0, gap)
-        free = np.array(
-            [(far * agility(motion, a, gap)) ** 2 + known[a][1][0, 0] + r[a] for a in axes]
-        )
+    gaps = {a: _gap(account, steps, time, a) for a in axes}
+    strange = distance > STRANGE and not unknown
+    if strange and max(gaps.values()) > 0.0 and not own and prior.manoeuvre > 0.0:
+        far = {a: reach(motion.order, 0, gaps[a]) for a in axes}
+        S = {a: known[a][1][0, 0] + r[a] for a in axes}
+        free = np.array([(far[a] * agility(motion, a, gaps[a])) ** 2 + S[a] for a in axes])
         off = {a: wrap(z[a] - known[a][0][0], period) for a in axes}
         gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
         turns = account.turns
         for a in axes:
-            speed = max(agility(motion, a, gap), HASTE * abs(off[a]) / far)
-            turns = put(turns, a, (*turns[a], (touched, speed)))
+            if gaps[a] > 0.0:
+                speed = max(agility(motion, a, gaps[a]), HASTE * abs(off[a]) / far[a])
+                turns = put(turns, a, (*turns[a], (account.touched[a], speed)))
         out.append(told(used(account._replace(turns=turns), axes), gain, "turns"))
     due = [a for a in axes if account.seen[a] and _due(prior, account, a, time)]
     if due and (due == axes or not own):
@@ -276,6 +286,11 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         fresh = used(fresh._replace(**over, began=time), axes)
         out.append(told(fresh, gain, "anew"))
     return out
+
+
+def _gap(account, steps, time, a):
+    """Seconds since an observation of the axis was last used."""
+    return time - steps[account.touched[a]] if account.touched[a] >= 0 else 0.0
 
 
 def _due(prior, account, a, time):

@@ -133,8 +133,10 @@ class Bank(NamedTuple):
         (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
     lost, missed
         (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
-    touched, moved
-        (k,) s, when an observation was last used, and when a velocity was.
+    touched
+        (k, axes) s, when an observation of the axis was last used.
+    moved
+        (k,) s, when a velocity was last used.
     scale
         (`MOST_SENSORS` + 1, 2) factor of the variances, and of the process noise, as adapted.
     last
@@ -224,7 +226,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d)),
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
-        np.full(most, np.nan),
+        np.full((most, d), np.nan),
         np.full(most, np.nan),
         np.ones((MOST_SENSORS + 1, 2)),
         np.zeros(2 * d),

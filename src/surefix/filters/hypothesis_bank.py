@@ -54,12 +54,12 @@ def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> N
         to.slip[i, a] = source.slip[k, a]
         to.lost[i, a] = source.lost[k, a]
         to.missed[i, a] = source.missed[k, a]
+        to.touched[i, a] = source.touched[k, a]
     to.began[i] = source.began[k]
     to.run[i] = source.run[k]
     to.opened[i] = source.opened[k]
     to.length[i] = source.length[k]
     to.faulty[i] = source.faulty[k]
-    to.touched[i] = source.touched[k]
     to.moved[i] = source.moved[k]
 
 
@@ -142,7 +142,6 @@ def apply_position(
         bank.missed[k] = 0
     elif code & DENY:
         bank.opened[k] = time
-    used = False
     for a in range(motion.axes):
         m = bank.mean[k, a]
         P = bank.covariance[k, a]
@@ -167,7 +166,8 @@ def apply_position(
             bank.missed[k, a] = 0
         if (code >> a) & 1:
             continue
-        used = True
+        gap = time - bank.touched[k, a]
+        bank.touched[k, a] = time
         if not bank.seen[k, a]:
             bank.seen[k, a] = True
             if math.isnan(bank.began[k]):
@@ -179,8 +179,7 @@ def apply_position(
             P[0, 0] = variance[a]
             continue
         nu = wrapped(z[a] - m[0], motion.period)
-        if code & MANOEUVRE:
-            gap = time - bank.touched[k]
+        if code & MANOEUVRE and gap > 0.0:
             rate = abs(nu) / reach(motion.order, 0, gap)
             rate = max(agility(motion.density[a], gap), HASTE * rate)
             change_rate(P, motion.order, gap, rate)
@@ -193,8 +192,6 @@ def apply_position(
             update_axis(m, P, n, 0, True, nu, variance[a])
         else:
             update_axis(m, P, n, 0, False, nu, variance[a])
-    if used:
-        bank.touched[k] = time
 
 
 @helper

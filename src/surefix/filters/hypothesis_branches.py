@@ -85,6 +85,12 @@ def log_normal(nu: float, S: float) -> float:
 
 
 @helper
+def _since(touched: float, time: float) -> float:
+    """Seconds since an axis was last observed; 0 if it never was."""
+    return 0.0 if math.isnan(touched) else time - touched
+
+
+@helper
 def _anywhere(square: float) -> float:
     """Log-density of a first fix: that of a gross error of the usual size."""
     return log_wild(1.0, 0.5 * math.log(square), 1)
@@ -121,6 +127,7 @@ def velocity_branches(
         distance = 0.0
         swift = 0.0
         quick = 0.0
+        longest = 0.0
         seen = 0
         for a in range(d):
             c = d + a
@@ -134,7 +141,8 @@ def velocity_branches(
             square += nu * nu / wide
             scale += 0.5 * math.log(wide)
             distance += nu * nu / S
-            gap = time - bank.touched[k]
+            gap = _since(bank.touched[k, a], time)
+            longest = max(longest, gap)
             free = agility(motion.density[a], gap) * reach(motion.order, 1, gap)
             free = free * free + S
             swift += nu * nu / free
@@ -158,7 +166,7 @@ def velocity_branches(
             parent[total], code[total] = k, VELOCITY_OUT
             total += 1
         strange = math.isnan(forced[d]) and distance > _STRANGE
-        if strange and time > bank.touched[k] and prior.manoeuvre > 0.0:
+        if strange and longest > 0.0 and prior.manoeuvre > 0.0:
             score[total] = bank.weight[k] + log_wild(swift, quick, seen)
             score[total] += math.log(prior.manoeuvre) + math.log1p(-out)
             parent[total], code[total] = k, MANOEUVRE
@@ -208,7 +216,7 @@ def position_branches(
         distance = 0.0
         swift = 0.0
         quick = 0.0
-        gap = time - bank.touched[k]
+        longest = 0.0
         unknown = False
         for a in range(d):
             if math.isnan(z[a]):
@@ -224,6 +232,8 @@ def position_branches(
                 inside[a] = log_normal(nu, S)
                 poor += log_normal(nu, S + variance[a] * _POORER)
                 distance += nu * nu / S
+                gap = _since(bank.touched[k, a], time)
+                longest = max(longest, gap)
                 free = agility(motion.density[a], gap) * reach(motion.order, 0, gap)
                 free = free * free + S
                 swift += nu * nu / free
@@ -272,7 +282,7 @@ def position_branches(
             parent[total], code[total] = k, OPEN
             total += 1
         strange = distance > _STRANGE and not unknown
-        if strange and gap > 0.0 and not own and prior.manoeuvre > 0.0:
+        if strange and longest > 0.0 and not own and prior.manoeuvre > 0.0:
             score[total] = base + log_wild(swift, quick, observed) + math.log(prior.manoeuvre)
             parent[total], code[total] = k, MANOEUVRE
             total += 1

@@ -85,14 +85,10 @@ def _untold(decisions: Decisions, first: int, every: int) -> bool:
 
 
 @helper
-def _touched(motion: Motion, seen: BoolArray, code: int) -> bool:
-    """Whether anything of an epoch was used, be it in a run."""
-    for a in range(motion.axes):
-        if seen[a] and not (code >> a) & 1:
-            return True
-        if seen[motion.axes + a] and not code & VELOCITY_OUT:
-            return True
-    return False
+def _touched(motion: Motion, seen: BoolArray, code: int, a: int) -> bool:
+    """Whether anything of an axis was used at an epoch, be it in a run."""
+    placed = seen[a] and not (code >> a) & 1
+    return placed or (seen[motion.axes + a] and not code & VELOCITY_OUT)
 
 
 @kernel
@@ -121,18 +117,18 @@ def decide(
     changed = head
     every = (1 << motion.axes) - 1
     both = 1 | 1 << motion.axes
-    turned = -1  # the earliest epoch after which the rates may have changed
+    turned = np.full(motion.axes, -1)  # the earliest epoch before which a rate may have changed
     anew = np.full(motion.axes, -1)  # the fix of a restart …
     lost = np.full(motion.axes, -1)  # … and the earliest one left out before it
     for k in range(head, first - 1, -1):
         code = trail.code[k, slot]
-        if turned >= 0 and _touched(motion, seen[k], code):
-            decisions.jump[turned] |= every << motion.axes
-            changed = min(changed, turned)
-            turned = -1
-        elif turned >= 0:
-            turned = k
         for a in range(motion.axes):
+            if turned[a] >= 0 and _touched(motion, seen[k], code, a):
+                decisions.jump[turned[a]] |= 1 << motion.axes + a
+                changed = min(changed, turned[a])
+                turned[a] = -1
+            elif turned[a] >= 0:
+                turned[a] = k
             if lost[a] < 0 or not seen[k, a]:
                 continue
             if (code >> a) & 1 or code & (OPEN | CONTINUE):
@@ -159,16 +155,16 @@ def decide(
         decisions.run[k] = 1 if inside else 0
         if code & OPEN:
             committed = False
-        if code & MANOEUVRE:
-            turned = k
         for a in range(motion.axes):
+            if code & MANOEUVRE and _touched(motion, seen[k], code, a):
+                turned[a] = k
             if code & (RESTART << a):
                 anew[a] = lost[a] = k
         slot = trail.parent[k, slot]
-    if turned >= 0:
-        decisions.jump[turned] |= every << motion.axes
-        changed = min(changed, turned)
     for a in range(motion.axes):
+        if turned[a] >= 0:
+            decisions.jump[turned[a]] |= 1 << motion.axes + a
+            changed = min(changed, turned[a])
         if lost[a] >= 0:
             at = anew[a] if first > 0 else lost[a]
             decisions.jump[at] |= both << a

@@ -88,13 +88,13 @@ def _apply_velocity(
         if not math.isnan(z[d + a]):
             m, P = bank.mean[i, a], bank.covariance[i, a]
             nu = z[d + a] - m[1]
-            if code & MANOEUVRE:
-                gap = time - bank.touched[i]
+            gap = time - bank.touched[i, a]
+            bank.touched[i, a] = time
+            if code & MANOEUVRE and gap > 0.0:
                 rate = abs(nu) / reach(motion.order, 1, gap)
                 rate = max(agility(motion.density[a], gap), HASTE * rate)
                 change_rate(P, motion.order, gap, rate)
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
-    bank.touched[i] = time
     bank.moved[i] = time
 
 

@@ -154,8 +154,21 @@ def decide_offline(
         fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
-        said = Decisions(fixed, jump, said.run)
+        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
     return said, filtered, smoothed
+
+
+def _at_fixes(motion: Motion, epochs: Epochs, jump: IntArray, fixed: FloatArray) -> IntArray:
+    """Jumps of positions put to the next fix that is used: between, the track before it goes on."""
+    moved = jump & ~((1 << motion.axes) - 1)
+    for a in range(motion.axes):
+        used = np.flatnonzero(np.isfinite(epochs.z[:, a]) & (fixed[:, a] > 0.0))
+        if not len(used):
+            continue
+        for k in np.flatnonzero((jump >> a) & 1):
+            later = np.searchsorted(used, k)
+            moved[used[later] if later < len(used) else k] |= 1 << a
+    return moved
 
 
 def _steady(prior: Prior) -> Recovery:
