@@ -8,8 +8,6 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
-from surefix.filters.hypotheses import Prior
-from surefix.filters.learning import learn
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis
@@ -49,7 +47,6 @@ class ChannelState(NamedTuple):
     lag: float = 0.0
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
-    prior: Prior | None = None
     filter: FilterState | None = None
 
     def nothing(self) -> Channel:
@@ -76,6 +73,7 @@ def clean_channel(
     final
         True with the last part.
     """
+    options = options.for_series
     time, value = new.time, new.value
     if state.held is not None:
         time = np.concatenate([state.held.time, time])
@@ -120,13 +118,13 @@ def clean_channel(
         options,
         state.motion,
         state.recovery,
-        state.prior,
+        None,
         state.lag,
         epochs,
         np.ones(n, np.bool_),
         state.filter,
     )
-    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=options.several)
+    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=False)
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
     known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
@@ -170,18 +168,7 @@ def _settle(
     interval = float(np.median(steps)) if len(steps) else 1.0
     turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
     speed = max(speed_scale(tau[seen], turned), 1e-6)
-    recovery, prior = Recovery(options.patience(interval), speed), None
-    if options.several:
-        figures, prior = learn(
-            observations,
-            unknown,
-            figures,
-            order=order,
-            period=new.period,
-            speed=speed,
-            longest=recovery.after,
-            floor=(max(quantum / 12.0**0.5, 1e-9), 1e-9),
-        )
+    recovery = Recovery(options.patience(interval), speed)
     motion = Motion(order, 1, np.array([figures.process**2]), by_axis(1), 2, new.period)
     unit = new.name.rsplit("_", 1)[-1]
     sigma = float(figures.position[0]) if np.isfinite(figures.position[0]) else 1.0
@@ -201,6 +188,5 @@ def _settle(
         lag=float(options.lag_s or _LAG_VALUES * interval),
         sigma=sigma,
         noise=noise,
-        prior=prior,
-        filter=begin(options, motion, recovery, prior),
+        filter=begin(options, motion, recovery, None),
     )

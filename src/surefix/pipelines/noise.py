@@ -103,8 +103,8 @@ def settle_noise(
         density[[axes.index(i) for i in block.axes]] = block.found.process**2
         noise += _named(block, sensors, model)
     prior = _joined(blocks, axes)
-    if prior is not None and options.mode == "realtime":
-        prior = prior._replace(adapt=_adapting(blocks))
+    if prior is not None and options.mode == "realtime" and blocks[0].axes != [2]:
+        prior = prior._replace(adapt=_adapting(blocks[0]))
     return Figures(model, sigma_position, sigma_velocity, density, tuple(noise), prior)
 
 
@@ -178,21 +178,20 @@ def _joined(blocks: list[_Block], axes: tuple[int, ...]) -> Prior | None:
     return first._replace(partial=max(first.partial, alone), spread=spread)
 
 
-def _adapting(blocks: list[_Block]) -> FloatArray:
-    """How fast figures follow a stream: those that nobody gave or declared."""
+def _adapting(block: _Block) -> FloatArray:
+    """How fast noise follows a stream: that of fixes which nobody gave or declared.
+
+    Sensors of depths and velocities stay as settled: they come so often that what a model misses
+    of the motion would be taken for their noise.
+    """
     adapt = np.zeros((MOST_SENSORS + 1, 2))
-    sensors = len(blocks[0].given.position)
-    for sensor in range(min(sensors, MOST_SENSORS)):
-        for part, name in enumerate(("position", "velocity")):
-            free = True
-            for block in blocks:
-                d, mine = len(block.axes), block.observations.sensor == sensor
-                declared = block.observations.declared[mine, part * d : (part + 1) * d]
-                free &= bool(np.isnan(getattr(block.given, name)[sensor]))
-                free &= not np.isfinite(declared).any()
-            adapt[sensor, part] = 1.0 / _MEMORY if free else 0.0
-    if all(np.isnan(block.given.process) for block in blocks):
-        adapt[MOST_SENSORS, 0] = 1.0 / _MEMORY
+    d = len(block.axes)
+    for sensor in range(min(len(block.given.position), MOST_SENSORS)):
+        mine = block.observations.sensor == sensor
+        placed = np.isfinite(block.observations.z[mine, :d]).any()
+        declared = np.isfinite(block.observations.declared[mine, :d]).any()
+        if placed and not declared and np.isnan(block.given.position[sensor]):
+            adapt[sensor, 0] = 1.0 / _MEMORY
     return adapt
 
 

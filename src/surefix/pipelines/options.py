@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, Literal, get_args
 
@@ -150,6 +150,11 @@ class CleanOptions:
         if self.method == _CIPRA_ROMERA:
             return loss_named("huber", k0=self.k0)._replace(by_noise=1)
         return loss_named(self.method, k0=self.k0, k1=self.k1, false_alarm=self.false_alarm)
+
+    @property
+    def for_series(self) -> CleanOptions:
+        """The same for a scalar series: it goes by IGG3 where positions have several hypotheses."""
+        return replace(self, method="igg3") if self.several else self
 
     @property
     def several(self) -> bool:
