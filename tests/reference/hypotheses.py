@@ -171,7 +171,14 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     return [
         *out,
         told(
-            account, gain, "turns", rows=rows, faulty=faulty, turns=turns, touched=touched, moved=time
+            account,
+            gain,
+            "turns",
+            rows=rows,
+            faulty=faulty,
+            turns=turns,
+            touched=touched,
+            moved=time,
         ),
     ]
 

@@ -82,9 +82,8 @@ class Prior(NamedTuple):
     sigma_velocity
         Standard deviation of a velocity nothing is known about, m/s.
     adapt
-        (`MOST_SENSORS` + 1, 2) how fast the noise of the positions and velocities of each sensor
+        (`MOST_SENSORS`, 2) how fast the noise of the positions and velocities of each sensor
         follows what is observed: 1 over the number of observations remembered, 0 for not at all.
-        The last row is for the process noise, (0, 0) or (gain, 0).
     """
 
     isolated: float
@@ -98,7 +97,7 @@ class Prior(NamedTuple):
     again: float
     spread: FloatArray
     sigma_velocity: float
-    adapt: FloatArray = np.zeros((MOST_SENSORS + 1, 2))
+    adapt: FloatArray = np.zeros((MOST_SENSORS, 2))
 
 
 class Bank(NamedTuple):
@@ -138,9 +137,7 @@ class Bank(NamedTuple):
     moved
         (k,) s, when a velocity was last used.
     scale
-        (`MOST_SENSORS` + 1, 2) factor of the variances, and of the process noise, as adapted.
-    last
-        (2·axes,) the standardised innovations that were used last.
+        (`MOST_SENSORS`, 2) factor of the variances of positions and velocities, as adapted.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -162,7 +159,6 @@ class Bank(NamedTuple):
     touched: FloatArray
     moved: FloatArray
     scale: FloatArray
-    last: FloatArray
     announced: FloatArray
 
 
@@ -228,7 +224,6 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d), np.int64),
         np.full((most, d), np.nan),
         np.full(most, np.nan),
-        np.ones((MOST_SENSORS + 1, 2)),
-        np.zeros(2 * d),
+        np.ones((MOST_SENSORS, 2)),
         np.full(1, np.nan),
     )

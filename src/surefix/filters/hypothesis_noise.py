@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import MOST_SENSORS, Bank, Found, Prior
+from surefix.filters.hypotheses import Bank, Found, Prior
 from surefix.filters.hypothesis_bank import best_of
 from surefix.filters.hypothesis_branches import wrapped
 from surefix.filters.records import Motion
@@ -15,10 +15,8 @@ from surefix.types import FloatArray
 
 __all__ = ["adapt", "innovate"]
 
-_PROCESS = MOST_SENSORS  # row of the process noise
-_LARGEST_ONE = 3.0  # no innovation counts for more when noise is adapted …
-_LARGEST = _LARGEST_ONE**2
-_MEAN_SQUARE = 0.9889  # … and then their squares have this mean, if all is well
+_LARGEST = 9.0  # no squared innovation counts for more when noise is adapted …
+_MEAN_SQUARE = 0.9889  # … and then they have this mean, if all is well
 _QUIET, _LOUD = 0.01, 100.0  # factors of a variance within which it is adapted
 
 
@@ -64,12 +62,12 @@ def adapt(
 ) -> None:
     """Let the noise figures follow the innovations that were used.
 
-    Squares that are larger than supposed call for more noise of the sensor; innovations that
-    resemble the ones before call for more noise of the process.
+    Squares that are larger than supposed call for more noise of the sensor, in proportion to its
+    share of the variance.
     """
     d = motion.axes
     for part in range(2):
-        gain, total, whole, alike, count = prior.adapt[sensor, part], 0.0, 0.0, 0.0, 0
+        gain, total, whole = prior.adapt[sensor, part], 0.0, 0.0
         for a in range(d):
             c = part * d + a
             s = out.standardised[k, c]
@@ -77,13 +75,5 @@ def adapt(
                 continue
             total += share[c] * (min(s * s, _LARGEST) - _MEAN_SQUARE)
             whole += share[c]
-            s = min(max(s, -_LARGEST_ONE), _LARGEST_ONE)
-            alike += s * bank.last[c]
-            bank.last[c] = s
-            count += 1
-        if count == 0:
-            continue
         step = math.exp(gain * total / max(whole, 1e-9))
         bank.scale[sensor, part] = min(max(bank.scale[sensor, part] * step, _QUIET), _LOUD)
-        step = math.exp(prior.adapt[_PROCESS, 0] * alike / count)
-        bank.scale[_PROCESS, 0] = min(max(bank.scale[_PROCESS, 0] * step, _QUIET), _LOUD)

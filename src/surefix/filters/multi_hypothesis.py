@@ -20,7 +20,6 @@ from surefix.filters.hypotheses import (
     COMMIT,
     CONTINUE,
     MANOEUVRE,
-    MOST_SENSORS,
     OPEN,
     POOR,
     POOR_WEIGHT,
@@ -220,8 +219,9 @@ def _run(
             origin[i], said[i] = i, 0
             if dt > 0.0:
                 for a in range(d):
-                    q = motion.density[a] * one.scale[MOST_SENSORS, 0]
-                    predict_axis(one.mean[i, a], one.covariance[i, a], motion.order, dt, q)
+                    predict_axis(
+                        one.mean[i, a], one.covariance[i, a], motion.order, dt, motion.density[a]
+                    )
         innovate(motion, one, k, z, r, found, share)
         placed = moved = False
         for a in range(d):
@@ -294,7 +294,7 @@ def filter_hypotheses(
     """
     n, most = len(epochs.time), len(bank.weight)
     one = _copied(bank)
-    shared = {name: getattr(one, name) for name in ("time", "number", "scale", "last", "announced")}
+    shared = {name: getattr(one, name) for name in ("time", "number", "scale", "announced")}
     two = _copied(bank)._replace(**shared)
     found = _blank(motion, n)
     rows = n if traced else 0

@@ -184,7 +184,7 @@ def _adapting(block: _Block) -> FloatArray:
     Sensors of depths and velocities stay as settled: they come so often that what a model misses
     of the motion would be taken for their noise.
     """
-    adapt = np.zeros((MOST_SENSORS + 1, 2))
+    adapt = np.zeros((MOST_SENSORS, 2))
     d = len(block.axes)
     for sensor in range(min(len(block.given.position), MOST_SENSORS)):
         mine = block.observations.sensor == sensor
