@@ -11,7 +11,6 @@ import argparse
 import os
 import pickle
 import shutil
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
@@ -23,7 +22,7 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-__all__ = ["CONSTANTS", "SCENARIOS", "Plan", "Variant", "measure", "value_of", "varied", "vary"]
+__all__ = ["CONSTANTS", "LOGS", "MODES", "Plan", "Variant", "measure", "value_of", "varied", "vary"]
 
 CONSTANTS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -57,21 +56,24 @@ CONSTANTS: Final[Mapping[str, str]] = MappingProxyType(
 A size is halved and doubled; a probability is divided by 3 and multiplied by 3; of one that is near
 to certainty the odds are.
 """
-SCENARIOS: Final = (
-    "isolated-40",
-    "burst-common",
-    "burst-independent",
-    "jump",
-    "small",
-    "one-axis",
-    "dvl-faults",
-    "speedboat",
+LOGS: Final = (
+    "isolated-40 alone",
+    "burst-common aided",
+    "burst-common alone",
+    "burst-independent alone",
+    "jump aided",
+    "small alone",
+    "one-axis alone",
+    "dvl-faults aided",
+    "speedboat aided",
+    "speedboat alone",
 )
-GROUPS: Final = tuple(product(("offline", "realtime"), ("aided", "alone")))
+"""Scenarios of `surefix compare`, aided by velocities or alone."""
+MODES: Final = ("offline", "realtime")
 _NAMES: Final = {"realtime": "real time"}
-_LEAST = 0.5  # change that is shown, %
+_LEAST, _NONE = 0.5, "·"  # change that is shown, %, and what stands for less
 
-Cell = tuple[str, str, str]  # mode, aided or alone, scenario
+Cell = tuple[str, str]  # mode and log
 
 
 class Variant(NamedTuple):
@@ -82,9 +84,9 @@ class Variant(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Scenarios, seed, number of worlds, and fixes of each log: run i draws from (seed, i)."""
+    """Logs, seed, number of worlds, and fixes of each log: run i draws from (seed, i)."""
 
-    scenarios: tuple[str, ...]
+    logs: tuple[str, ...]
     seed: int
     runs: int
     epochs: int
@@ -139,16 +141,12 @@ def measure(plan: Plan) -> dict[Cell, float]:
     method = "multi-hypothesis"
     options = CompareOptions(seed=plan.seed, runs=plan.runs, epochs=plan.epochs)
     found: dict[Cell, list[float]] = {}
-    for run, scenario in product(range(plan.runs), plan.scenarios):
+    for run, drawn in product(range(plan.runs), plan.logs):
+        scenario, kind = drawn.split(" ")
         trial = draw(scenario, world_of(options, run), (plan.seed, run))
-        both = {"aided": trial, "alone": alone(trial)}
-        if trial.scenario.velocity_runs:
-            del both["alone"]
-        for kind, each in both.items():
-            for (mode, name), outcome in outcomes(each, (method,), ("offline", "realtime")).items():
-                if name == method:
-                    ratio = outcome.merit.rmse_ratio
-                    found.setdefault((mode, kind, scenario), []).append(ratio)
+        made = outcomes(trial if kind == "aided" else alone(trial), (method,), MODES)
+        for mode in MODES:
+            found.setdefault((mode, drawn), []).append(made[mode, method].merit.rmse_ratio)
     return {cell: fsum(ratios) / plan.runs for cell, ratios in found.items()}
 
 
@@ -184,12 +182,11 @@ def _once(learn: Callable[..., Any]) -> Callable[..., Any]:
     return learnt
 
 
-def _base_table(base: Mapping[Cell, float], scenarios: Sequence[str]) -> Iterator[str]:
-    yield _row(["scenario", *(_named(*group) for group in GROUPS)])
-    yield _row(["---", *["---:"] * len(GROUPS)])
-    for scenario in scenarios:
-        ratios = [base.get((*group, scenario)) for group in GROUPS]
-        yield _row([scenario, *("–" if r is None else f"{r:.3f}" for r in ratios)])
+def _base_table(base: Mapping[Cell, float], logs: Sequence[str]) -> Iterator[str]:
+    yield _row(["RMSE / oracle", *map(_named, MODES)])
+    yield _row(["---", *["---:"] * len(MODES)])
+    for drawn in logs:
+        yield _row([drawn, *(f"{base[mode, drawn]:.3f}" for mode in MODES)])
 
 
 def _changes(base: Mapping[Cell, float], found: Mapping[Cell, float]) -> dict[Cell, float]:
@@ -198,26 +195,25 @@ def _changes(base: Mapping[Cell, float], found: Mapping[Cell, float]) -> dict[Ce
 
 
 def _variant_row(variant: Variant, changes: Mapping[Cell, float]) -> str:
-    """Mean change of each group, and where the figures change most in either direction."""
+    """Mean change in each mode, and where the figures change most in either direction."""
     value = varied(CONSTANTS[variant.name], value_of(variant.name), variant.up)
     cells = []
-    for group in GROUPS:
-        logs = [log(1.0 + x / 100.0) for cell, x in changes.items() if cell[:2] == group]
-        cells.append(_shown(100.0 * (exp(fsum(logs) / len(logs)) - 1.0)) if logs else "–")
-    for extreme in (max, min):
-        cell = extreme(changes, key=lambda each: changes[each])
-        wrong = changes[cell] <= 0.0 if extreme is max else changes[cell] >= 0.0
-        shown = "·" if wrong else _shown(changes[cell])
-        cells.append(shown if shown == "·" else f"{shown} {cell[2]}, {_named(*cell[:2])}")
+    for mode in MODES:
+        logs = [log(1.0 + change / 100.0) for cell, change in changes.items() if cell[0] == mode]
+        cells.append(_shown(100.0 * (exp(fsum(logs) / len(logs)) - 1.0)))
+    for sign in (1.0, -1.0):
+        most, where = max((sign * change, cell) for cell, change in changes.items())
+        shown = _shown(sign * max(most, 0.0))
+        cells.append(shown if shown == _NONE else f"{shown} {where[1]}, {_named(where[0])}")
     return _row([f"`{variant.name}`", f"{value:.3g}", *cells])
 
 
 def _shown(change: float) -> str:
-    return "·" if abs(change) < _LEAST else f"{change:+.1f}".replace("-", "−")
+    return _NONE if abs(change) < _LEAST else f"{change:+.1f}".replace("-", "−")
 
 
-def _named(mode: str, kind: str) -> str:
-    return f"{_NAMES.get(mode, mode)} {kind}"
+def _named(mode: str) -> str:
+    return _NAMES.get(mode, mode)
 
 
 def _row(cells: Sequence[str]) -> str:
@@ -226,7 +222,7 @@ def _row(cells: Sequence[str]) -> str:
 
 def _parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name, known in (("constants", tuple(CONSTANTS)), ("scenarios", SCENARIOS)):
+    for name, known in (("constants", tuple(CONSTANTS)), ("logs", LOGS)):
         parser.add_argument(f"--{name}", nargs="+", default=known, metavar="NAME", choices=known)
     for name, usual in (("seed", 11), ("runs", 2), ("epochs", 1200), ("jobs", 1)):
         parser.add_argument(f"--{name}", type=int, default=usual, help=f"default {usual}")
@@ -236,17 +232,17 @@ def _parsed() -> argparse.Namespace:
 def main() -> None:
     """Print the figures of the filter as it is, the change by each variant, and the worst."""
     given = _parsed()
-    plan = Plan(tuple(given.scenarios), given.seed, given.runs, given.epochs)
+    plan = Plan(tuple(given.logs), given.seed, given.runs, given.epochs)
     variants = [Variant(name, up) for name in given.constants for up in (False, True)]
     worst: dict[str, float] = {}
     with TemporaryDirectory() as place:
         kernels = Path(place)
         with ProcessPoolExecutor(given.jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
             base = pool.submit(_apart, None, plan, kernels).result()
-            print("\n".join(_base_table(base, plan.scenarios)), end="\n\n", flush=True)
-            groups = [_named(*group) for group in GROUPS]
-            print(_row(["constant", "changed to", *groups, "worst, %", "best, %"]))
-            print(_row(["---", "---:", *["---:"] * len(groups), "---", "---"]))
+            print("\n".join(_base_table(base, plan.logs)), end="\n\n", flush=True)
+            modes = [f"{_named(mode)}, %" for mode in MODES]
+            print(_row(["constant", "changed to", *modes, "worst, %", "best, %"]))
+            print(_row(["---", "---:", *["---:"] * len(modes), "---", "---"]))
             waiting = [pool.submit(_apart, each, plan, kernels) for each in variants]
             for variant, found in zip(variants, waiting, strict=True):
                 changes = _changes(base, found.result())
@@ -257,4 +253,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
