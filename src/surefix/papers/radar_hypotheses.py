@@ -65,7 +65,7 @@ def filter_several(
         np.zeros(n, np.int64),
     )
     sigma = float(np.sqrt(np.median(series.variance)))
-    prior = supposed(axes, sigma, 1.0, _SPEED, LONGEST_S)
+    prior = supposed(axes, sigma, 1.0, _SPEED, LONGEST_S)._replace(manoeuvre=0.0)  # they are weak
     after, found = realtime_hypotheses(motion, prior, epochs, bank)
     return after, found.mean[:, :axes].copy()
 
