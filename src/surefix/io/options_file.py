@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from surefix.errors import InputError, OptionsError, ParseError
+from surefix.errors import OptionsError
+from surefix.io.toml_file import read_toml
 
 __all__ = ["OptionsFile", "read_options"]
 
@@ -46,12 +46,7 @@ def read_options(path: str | Path) -> OptionsFile:
         A table or key is not known, or a value has the wrong type.
     """
     place = Path(path)
-    try:
-        content = tomllib.loads(place.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"{place}: {error.strerror}", "a readable TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParseError(f"{place}: {error}", "a TOML file") from error
+    content = read_toml(place)
     for name, value in content.items():
         if name not in _TABLES or not isinstance(value, dict):
             raise OptionsError(

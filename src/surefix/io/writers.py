@@ -27,6 +27,7 @@ __all__ = [
     "TrackWriter",
     "channel_writer",
     "resampled_writer",
+    "table_sink",
     "track_writer",
     "write_channel",
     "write_cleaned",
@@ -35,6 +36,7 @@ __all__ = [
 SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx")
 
 _Add = Callable[[Batch], None]
+_AddRows = Callable[[pa.Table], None]
 
 
 class TrackWriter:
@@ -147,21 +149,32 @@ def channel_writer(
         The suffix is neither ``.csv`` nor ``.parquet``, or the file cannot be written.
     """
     place = Path(path)
-    suffix = place.suffix.lower()
-    if suffix not in SUFFIXES[:2]:
-        raise _unknown(place, SUFFIXES[:2])
+    kind = table_sink(place)
     with replacing(place) as file, contextlib.ExitStack() as stack:
-        sink: Callable[[pa.Table], None] | None = None
+        sink: _AddRows | None = None
 
         def add(channel: CleanedChannel) -> None:
             nonlocal sink
             rows = channel_table(channel, iso=iso)
             if sink is None:
-                kind = write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
                 sink = stack.enter_context(kind(file, rows.schema))
             sink(rows)
 
         yield add
+
+
+def table_sink(place: Path) -> Callable[..., contextlib.AbstractContextManager[_AddRows]]:
+    """Choose what writes a table by the suffix of its file.
+
+    Raises
+    ------
+    OutputError
+        The suffix is neither ``.csv`` nor ``.parquet``.
+    """
+    suffix = place.suffix.lower()
+    if suffix not in SUFFIXES[:2]:
+        raise _unknown(place, SUFFIXES[:2])
+    return write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
 
 
 @contextlib.contextmanager
