@@ -17,8 +17,7 @@ from surefix.io.nmea_sentence import LAYOUTS
 from surefix.io.options_file import read_options
 from surefix.io.roles import ALIASES, ROLES, UNITS
 from surefix.pipelines import deliver
-from surefix.pipelines.channels import CHANNEL_HEAD
-from surefix.pipelines.clean import HEAD
+from surefix.pipelines.channels import channel_head
 from surefix.pipelines.options import METHODS, MULTI_HYPOTHESIS
 from surefix.reasons import texts
 from surefix.robust.loss import LOSSES
@@ -194,8 +193,8 @@ def test_modules_that_are_named_exist():
 
 def test_figures_in_the_how_to_are_those_of_the_code():
     text = (DOCS / "how-to.md").read_text(encoding="utf-8")
-    assert f"first {HEAD:,}\nrows" in text
-    assert f"({CHANNEL_HEAD:,} values" in text
+    assert f"first {surefix.CleanOptions().settle_rows:,}\nrows" in text
+    assert f"({channel_head(surefix.CleanOptions()):,} values" in text
     assert f"more than {deliver._KEPT:,}" in text
 
 

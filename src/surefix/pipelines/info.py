@@ -49,8 +49,10 @@ def describe(
         require_checksum=require_checksum,
         progress=progress,
     )
-    for source in sources:
-        source.logs = _counting(source.logs, counts.setdefault(source.name, {}))
+    sources = [
+        source._replace(logs=_counting(source.logs, counts.setdefault(source.name, {})))
+        for source in sources
+    ]
     size = sum(Path(path).stat().st_size for path in inputs)
     mode: Mode = "realtime" if size > _LARGE else "offline"
     cleaned = clean_sources(sources, CleanOptions(mode=mode))

@@ -16,8 +16,8 @@ from surefix.io.columns import Role
 from surefix.io.nmea_log import read_nmea, sniff
 from surefix.io.table import from_frame, read_table
 from surefix.pipelines.channels import ChannelState, clean_channel
+from surefix.pipelines.clean import Source
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.rows import Source
 from surefix.types import Channel, Fixes, FloatArray, Log
 
 __all__ = ["Data", "Progress", "open_inputs", "open_log"]

@@ -71,6 +71,10 @@ class CleanOptions:
     latency
         What is done about fixes that are late against a velocity: ``report`` says so, ``remove``
         also takes the delay off their times (not in real time), ``ignore`` does not look.
+    settle_rows
+        In real time: rows that frame, noise figures and height offsets are settled on before the
+        first result, at least 10. Scalar series are settled on as many values, but no more than
+        2,000.
     held
         Count a position that is polled again only once.
     """
@@ -92,6 +96,7 @@ class CleanOptions:
     every_s: float | None = None
     reorder_s: float = 10.0
     latency: Latency = "report"
+    settle_rows: int = 20_000
     held: bool = True
 
     def __post_init__(self) -> None:
@@ -138,6 +143,8 @@ class CleanOptions:
             raise OptionsError(f"false_alarm = {self.false_alarm}", "a share between 0 and 1")
         if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
+        if _number("settle_rows", self.settle_rows) < 10 or self.settle_rows % 1:
+            raise OptionsError(f"settle_rows = {self.settle_rows}", "a whole number from 10 on")
         if not isinstance(self.held, bool):
             raise OptionsError(f"held = {self.held!r}", "true or false")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
