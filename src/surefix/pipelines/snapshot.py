@@ -1,0 +1,132 @@
+"""A session as bytes, to be stored and gone on from: no code in it, only records of surefix.
+
+The bytes are a head (magic, form, check sum), a JSON text that says how records are nested, and the
+arrays one after the other. What is read back is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from importlib.metadata import version
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surefix.errors import InputError, OptionsError
+from surefix.pipelines.state import Session
+
+__all__ = ["restored", "snapshot"]
+
+_MAGIC: Final = b"surefix\x00"
+_HEAD: Final = struct.Struct("<8sIIQ")  # magic, form, check sum of length and body, length of the JSON
+_FORM: Final = 1
+_KINDS: Final = "biuf"  # of arrays
+_PLAIN: Final = (bool, int, float, str, type(None))
+_OURS: Final = "surefix."
+
+
+def snapshot(session: Session) -> bytes:
+    """Everything that a session remembers.
+
+    Raises
+    ------
+    OptionsError
+        It has an estimator of its own, which cannot be stored.
+    """
+    if session.estimator is not None:
+        raise OptionsError("a session with an estimator of its own", "a method of the options")
+    arrays: list[NDArray[Any]] = []
+    tree = {"version": version("surefix"), "session": _packed(session, arrays)}
+    tree["arrays"] = [[array.dtype.str, array.shape] for array in arrays]
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    body = b"".join([text, *(array.tobytes() for array in arrays)])
+    return _HEAD.pack(_MAGIC, _FORM, zlib.crc32(body, len(text)), len(text)) + body
+
+
+def restored(stored: bytes) -> Session:
+    """Read back what `snapshot` gave.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or was written by another version.
+    """
+    body = stored[_HEAD.size :]
+    if len(stored) < _HEAD.size or stored[:8] != _MAGIC:
+        raise InputError("bytes that are no snapshot", "what surefix stored")
+    _, form, check, length = _HEAD.unpack_from(stored)
+    if form != _FORM or zlib.crc32(body, length & 0xFFFFFFFF) != check or length > len(body):
+        raise InputError("a snapshot that is damaged", "what surefix stored, whole")
+    tree = json.loads(body[:length])
+    if tree["version"] != version("surefix"):
+        raise InputError(
+            f"a snapshot of surefix {tree['version']}",
+            f"one of surefix {version('surefix')}",
+            "go on with the version that wrote it, or begin anew",
+        )
+    arrays, at = [], length
+    for kind, shape in tree["arrays"]:
+        dtype = np.dtype(kind)
+        if dtype.kind not in _KINDS:
+            raise InputError(f"a snapshot with an array of {kind}", "numbers")
+        count = int(np.prod(shape, dtype=np.int64))
+        arrays.append(np.frombuffer(body, dtype, count, at).reshape(shape).copy())
+        at += arrays[-1].nbytes
+    session = _unpacked(tree["session"], arrays)
+    if not isinstance(session, Session):
+        raise InputError("a snapshot of something else", "one of a session")
+    return session
+
+
+def _packed(value: object, arrays: list[NDArray[Any]]) -> Any:
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind not in _KINDS:
+            raise TypeError(f"an array of {value.dtype} in a session")
+        arrays.append(np.ascontiguousarray(value).reshape(value.shape))
+        return {"array": len(arrays) - 1}
+    if isinstance(value, np.generic):
+        return value.item()
+    if type(value) in _PLAIN:
+        return value
+    if isinstance(value, Mapping):
+        return {"map": [[_packed(k, arrays), _packed(v, arrays)] for k, v in value.items()]}
+    names = _names(type(value))
+    if names is not None:
+        held = {name: _packed(getattr(value, name), arrays) for name in names}
+        return {"is": f"{type(value).__module__}:{type(value).__qualname__}", "with": held}
+    if isinstance(value, tuple):
+        return [_packed(item, arrays) for item in value]
+    raise TypeError(f"{type(value).__name__} in a session")
+
+
+def _unpacked(tree: Any, arrays: list[NDArray[Any]]) -> Any:
+    if isinstance(tree, list):
+        return tuple(_unpacked(item, arrays) for item in tree)
+    if not isinstance(tree, dict):
+        return tree
+    if "array" in tree:
+        return arrays[tree["array"]]
+    if "map" in tree:
+        return {_unpacked(k, arrays): _unpacked(v, arrays) for k, v in tree["map"]}
+    module, _, name = tree["is"].partition(":")
+    kind = getattr(import_module(module), name) if module.startswith(_OURS) else None
+    names = _names(kind) if isinstance(kind, type) else None
+    if kind is None or names is None or set(names) != set(tree["with"]):
+        raise InputError(f"a snapshot with {tree['is']}", "records of this version of surefix")
+    return kind(**{key: _unpacked(held, arrays) for key, held in tree["with"].items()})
+
+
+def _names(kind: type) -> list[str] | None:
+    """Fields of a record of surefix that make it; None for anything else."""
+    if not kind.__module__.startswith(_OURS):
+        return None
+    if is_dataclass(kind):
+        return [field.name for field in fields(kind) if field.init]
+    named = getattr(kind, "_fields", None)
+    return list(named) if issubclass(kind, tuple) and named is not None else None
