@@ -24,7 +24,7 @@ from surefix.pipelines.state import Session
 __all__ = ["restored", "snapshot"]
 
 _MAGIC: Final = b"surefix\x00"
-_HEAD: Final = struct.Struct("<8sIIQ")  # magic, form, check sum of length and body, length of the JSON
+_HEAD: Final = struct.Struct("<8sIIQ")  # magic, form, check sum of the rest, length of the JSON
 _FORM: Final = 1
 _KINDS: Final = "biuf"  # of arrays
 _PLAIN: Final = (bool, int, float, str, type(None))
