@@ -30,10 +30,11 @@ from surefix.io.nmea_record import (
 )
 from surefix.types import Channel, Event, Log, Problem
 
-__all__ = ["read_nmea", "sniff"]
+__all__ = ["NmeaStream", "read_nmea", "sniff"]
 
 _BLOCK = 1 << 18
 _STEP = 256  # frames between two looks at the size of a chunk
+_UNDATED = 500  # rows of a stream that wait for the first date
 _SAMPLES_PER_FIX = 10  # a chunk also ends after so many channel samples per fix it may hold
 _ANGLES = frozenset({"heading_deg", "heading_magnetic_deg", "course_deg"})
 _SHARE = 0.3
@@ -97,7 +98,7 @@ def read_nmea(
     InputError
         If the file cannot be read.
     """
-    reader = _Reader(path, require_checksum)
+    reader = NmeaStream(path, require_checksum)
     state, done, given = START, 0, 0
     step = min(max(chunk_fixes, 1), _STEP)
     try:
@@ -120,11 +121,21 @@ def read_nmea(
         yield rest
 
 
-class _Reader:
-    """What has been read and not yet given out."""
+class NmeaStream:
+    """A log that comes in pieces, cut anywhere: what has been read and not yet given out.
 
-    def __init__(self, path: Path, require_checksum: bool) -> None:
+    Parameters
+    ----------
+    path
+        Its name, which the names of sensors begin with.
+    require_checksum
+        As for `read_nmea`.
+    """
+
+    def __init__(self, path: Path, require_checksum: bool = True) -> None:
         self._path = path
+        self._framing = START
+        self._arrival = math.nan
         self._require_checksum = require_checksum
         self._clock = LogClock()
         self._epochs = Epochs()
@@ -150,6 +161,31 @@ class _Reader:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
+    def read(self, data: bytes, arrival: float = math.nan) -> Log:
+        """Read the next piece and give the rows that are complete.
+
+        As long as there is no date, up to 500 rows wait for one.
+
+        Parameters
+        ----------
+        data
+            The piece.
+        arrival
+            s, Unix, when it arrived; it is the time of reception of lines that do not say one.
+        """
+        self._arrival = arrival
+        self._framing, frames = frame(self._framing, data)
+        self.add(frames)
+        if self._clock.dated or self.size >= _UNDATED:
+            return self.chunk()
+        return Log(source=str(self._path))
+
+    def rest(self) -> Log:
+        """Read the line without an end, if there is one, and give all rows."""
+        self.add(finish(self._framing))
+        self._framing = START
+        return self.chunk(last=True)
+
     def add(self, frames: Sequence[Frame]) -> None:
         """Read the next frames."""
         for item in frames:
@@ -160,7 +196,7 @@ class _Reader:
         if prefix:
             self._received(line, prefix)
         elif line != self._line:
-            self._clock.receive = math.nan
+            self._clock.receive = self._arrival
         self._line = line
         if problem is not None:
             self._problem(problem, line, text)

@@ -25,6 +25,7 @@ from surefix.io.toml_file import read_toml
 __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
+_LIVE = ("input", "output", "journal")  # of surefix live, whose file holds for surefix clean too
 _SENSOR_KEYS = ("delay_s", "sigma")
 
 
@@ -48,6 +49,8 @@ def read_options(path: str | Path) -> OptionsFile:
     place = Path(path)
     content = read_toml(place)
     for name, value in content.items():
+        if name in _LIVE:
+            continue
         if name not in _TABLES or not isinstance(value, dict):
             raise OptionsError(
                 f"{place}: {name!r}", "the tables " + ", ".join(f"[{t}]" for t in _TABLES)

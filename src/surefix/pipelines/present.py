@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from dataclasses import fields
+from functools import cache
 from importlib.metadata import version
 
 import numpy as np
@@ -96,4 +97,9 @@ def settings(options: CleanOptions, setup: Setup | None) -> dict[str, str]:
         if value is not None and value != {}
     }
     out["python"] = platform.python_version()
-    return out | {name: version(name) for name in _VERSIONS}
+    return out | _versions()
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return {name: version(name) for name in _VERSIONS}

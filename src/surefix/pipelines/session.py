@@ -21,7 +21,7 @@ from surefix.pipelines.rows import Rows, join_rows, take_rows
 from surefix.pipelines.state import Estimator, Session
 from surefix.types import Channel, Cleaned, CleanedChannel, Event, Log
 
-__all__ = ["advance", "begin_session"]
+__all__ = ["advance", "begin_session", "end_on_trial"]
 
 _PORTION = 50_000  # rows cleaned at a time in real time; or as many as it is settled on
 
@@ -84,6 +84,29 @@ def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tu
     return _batches(replace(session, waiting=()), waiting, final=merging.ended)
 
 
+def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
+    """Tell what is known of the newest rows, which still wait for late ones to be put before them.
+
+    It is what `advance` would give if all inputs ended here, but for series that are not settled.
+
+    Parameters
+    ----------
+    session
+        In real time and settled; it goes on from where it is.
+    logs
+        What is left of each input.
+    """
+    waiting = [*session.waiting]
+    merging = session.merging
+    for source, log in enumerate(logs):
+        for part in (log, None):
+            if not merging.inflows[source].ended:
+                merging, chunk = merge(merging, source, part, session.options)
+                waiting.append(chunk)
+    session = replace(session, merging=merging, waiting=(), arrived={})
+    return _batches(session, waiting, final=True, begins=False)[1]
+
+
 def _nothing_found(session: Session) -> InputError:
     """Say why there is nothing to clean; the commonest problem is the likeliest reason."""
     problems = [problem for chunk in session.waiting for problem in chunk.problems]
@@ -97,7 +120,7 @@ def _nothing_found(session: Session) -> InputError:
 
 
 def _batches(
-    session: Session, chunks: Sequence[Chunk], *, final: bool
+    session: Session, chunks: Sequence[Chunk], *, final: bool, begins: bool = True
 ) -> tuple[Session, tuple[Cleaned, ...]]:
     """Clean what was read, in real time in portions of bounded size."""
     parts = [chunk.rows for chunk in chunks if chunk.rows is not None]
@@ -107,10 +130,10 @@ def _batches(
     if session.options.mode == "realtime" and rows is not None and len(rows.tau) > size:
         starts = range(0, len(rows.tau), size)
         portions = [take_rows(rows, slice(at, at + size)) for at in starts]
-    session, first = _batch(session, portions[0], chunks, final=final)
+    session, first = _batch(session, portions[0], chunks, final=final, begins=begins)
     batches = [first]
     for portion in portions[1:]:
-        session, batch = _batch(session, portion, (), final=False)
+        session, batch = _batch(session, portion, (), final=False, begins=begins)
         batches.append(batch)
     if final and session.held:
         text = f"{session.held} fixes were held, the same position polled again; each counted once"
@@ -121,7 +144,7 @@ def _batches(
 
 
 def _batch(
-    session: Session, rows: Rows | None, chunks: Sequence[Chunk], *, final: bool
+    session: Session, rows: Rows | None, chunks: Sequence[Chunk], *, final: bool, begins: bool
 ) -> tuple[Session, Cleaned]:
     """Clean one portion of rows, and the series that came with ``chunks``."""
     events = [event for chunk in chunks for event in chunk.events]
@@ -131,7 +154,7 @@ def _batch(
         session, cleaned = clean_rows(session, rows)
     else:
         cleaned = nothing(session.sensors, session.options, session.setup)
-    session, channels = _clean_channels(session, chunks, final=final)
+    session, channels = _clean_channels(session, chunks, final=final, begins=begins)
     return session, replace(
         cleaned,
         sources=session.names,
@@ -150,9 +173,12 @@ def _enough(series: Channel, options: CleanOptions) -> bool:
 
 
 def _clean_channels(
-    session: Session, chunks: Sequence[Chunk], *, final: bool
+    session: Session, chunks: Sequence[Chunk], *, final: bool, begins: bool
 ) -> tuple[Session, tuple[CleanedChannel, ...]]:
-    """Clean the series of a batch; one that just begins waits until there is enough to settle."""
+    """Clean the series of a batch; one that just begins waits until there is enough to settle.
+
+    Without ``begins`` it waits in any case.
+    """
     states, arrived = {**session.channels}, {**session.arrived}
     for chunk in chunks:
         for channel in chunk.channels:
@@ -167,7 +193,8 @@ def _clean_channels(
             time=np.concatenate([part.time for part in parts]),
             value=np.concatenate([part.value for part in parts]),
         )
-        if key not in states and not final and not _enough(whole, session.options):
+        ready = begins and (final or _enough(whole, session.options))
+        if key not in states and not ready:
             continue
         arrived.pop(key, None)
         cleaned, states[key] = clean_channel(whole, state, session.options, final=final)
