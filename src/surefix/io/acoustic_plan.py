@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from surefix.errors import OptionsError
 from surefix.io.acoustic_line import read_line
-from surefix.io.acoustic_record import Attitude, Place, Sighting
+from surefix.io.acoustic_record import NOT_MEASURED, Attitude, Place, Sighting
 from surefix.io.acoustic_ship import HEADINGS
 from surefix.io.nmea import parse
 from surefix.io.nmea_epoch import source
@@ -91,7 +91,8 @@ def is_acoustic(path: Path) -> bool:
 def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan | None:
     """Look an acoustic log through; None if its fixes are the ship's own.
 
-    Without a target it is the one that is seen most often, a ship only where nothing else is.
+    Without a target it is the one that is seen most often, a ship only where nothing else is;
+    measured positions come before those that the system filtered.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ class _Seen:
             else:
                 continue
             if isinstance(record, Sighting):
-                self._targets.setdefault(record.target, Counter())[record.place] += 1
+                self._targets.setdefault(record.target, Counter())[record.place] += record.valid
             elif isinstance(record, Position):
                 self._sources[source(record.talker)] += record.valid
             elif isinstance(record, Heading | Attitude):
@@ -146,7 +147,7 @@ class _Seen:
                     self._headings.add(HEADINGS[record.type])
 
     def plan(self, path: Path, target: str | None) -> Plan | None:
-        names = sorted(self._targets, key=lambda name: -self._targets[name].total())
+        names = sorted(self._targets, key=lambda name: -self._worth(name))
         if target is not None and target not in names and target != SHIP:
             known = ", ".join([*names, *([SHIP] if self._sources else [])])
             raise OptionsError(
@@ -161,6 +162,10 @@ class _Seen:
         place = _place(self._targets[chosen], bool(ship), heading < _NO_RANK)
         others = tuple(name for name in names if name != chosen)
         return Plan(chosen, place, ship, heading, others)
+
+    def _worth(self, name: str) -> float:
+        """Valid sightings of a target; one that was filtered counts as half a measured one."""
+        return self._targets[name].total() / (2 if name.endswith(NOT_MEASURED) else 1)
 
 
 def _place(seen: Counter[Place], ship: bool, heading: bool) -> Place:

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-__all__ = ["Attitude", "BodyVelocity", "Place", "Sighting"]
+__all__ = ["NOT_MEASURED", "Attitude", "BodyVelocity", "Place", "Sighting"]
 
 Place = Literal["ship", "north", "grid", "globe"]
 """What a position is in: the ship's axes (x starboard, y forward), axes through the ship (x east,
 y north), a map grid whose zone is not told (x easting, y northing), or latitude and longitude."""
+
+
+NOT_MEASURED = (" filtered", " predicted")
+"""Ends of the names of targets whose positions are no measurements of their own."""
 
 
 class Sighting(NamedTuple):
@@ -21,8 +25,7 @@ class Sighting(NamedTuple):
     Parameters
     ----------
     target
-        Whose position: the transponder's name, with ``filtered`` or ``predicted`` where the system
-        says that the position is no measurement of its own.
+        Whose position: the transponder's name, with one of `NOT_MEASURED` where the system says so.
     second
         s since midnight, when it was measured; NaN where ``measured`` says it.
     place
@@ -32,7 +35,7 @@ class Sighting(NamedTuple):
     depth
         m, positive down.
     sigma_x, sigma_y, sigma_depth
-        m, standard deviations that the system declares, along east and north or as ``x`` and ``y``.
+        m, standard deviations that the system declares; east and north, equal for ``ship``.
     valid
         False where the system marks the position as bad.
     day

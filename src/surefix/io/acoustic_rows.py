@@ -120,10 +120,11 @@ class Sightings:
         found = placed(record, time, self._ship, self._plan.place)
         if found is None:
             self.lost.append(time)
-            where = (math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+            where = (math.nan, math.nan, math.nan)
         else:
-            where = (found.x, found.y, -record.depth, *found[2:], record.sigma_depth)
-        for column, value in zip(self._columns, (time, *where), strict=True):
+            where = (found.x, found.y, -record.depth)
+        sigma = record.sigma_x, record.sigma_y, record.sigma_depth
+        for column, value in zip(self._columns, (time, *where, *sigma), strict=True):
             column.append(value)
         self._valid.append(record.valid)
         if not self.sources:

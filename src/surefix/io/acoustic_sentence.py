@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 
-from surefix.io.acoustic_record import Attitude, Place, Sighting
+from surefix.io.acoustic_record import NOT_MEASURED, Attitude, Place, Sighting
 from surefix.io.nmea_sentence import (
     _ANY,
     _LATITUDE,
@@ -40,7 +40,7 @@ __all__ = ["PROPRIETARY", "UnknownCoordinatesError"]
 
 _NUMBER = r"([-+]?\d{0,9}\.?\d{0,12})"  # of a map grid as well
 _NAME = r"([^,*]{0,31}[^,*\s])"
-_NOT_MEASURED = {"M": "", "F": " filtered", "P": " predicted"}
+_FILTER = {"M": "", "F": NOT_MEASURED[0], "P": NOT_MEASURED[1]}
 _CHANNELS = 3  # hydrophones of four that a position needs
 
 
@@ -55,7 +55,7 @@ def _sigma(text: str) -> float:
 
 def _simssb(talker: str, kind: str, f: tuple[str, ...]) -> Sighting:
     second = _second(f[0], f[1], f[2])
-    target = f[3].strip() + _NOT_MEASURED[f[8] + f[17]]
+    target = f[3].strip() + _FILTER[f[8] + f[17]]
     sigma = _sigma(f[21])
     if f[6]:
         place: Place = "globe"

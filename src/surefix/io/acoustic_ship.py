@@ -31,12 +31,10 @@ _Entry = TypeVar("_Entry", bound=tuple[float, ...])
 
 
 class Placed(NamedTuple):
-    """A sighting in the axes of the output: x, y m or latitude, longitude deg; with its sigmas."""
+    """A sighting in the axes of the output: x, y m or latitude, longitude deg."""
 
     x: float
     y: float
-    sigma_x: float
-    sigma_y: float
 
 
 @dataclass(slots=True)
@@ -131,20 +129,16 @@ def placed(sighting: Sighting, time: float, ship: Ship, place: str) -> Placed | 
         What the output is in, one of `surefix.io.acoustic_record.Place`.
     """
     if math.isnan(sighting.x):
-        return Placed(math.nan, math.nan, math.nan, math.nan)
-    x, y, sigma_x, sigma_y = sighting.x, sighting.y, sighting.sigma_x, sighting.sigma_y
+        return Placed(math.nan, math.nan)
+    x, y = sighting.x, sighting.y
     if sighting.place == place:
-        return Placed(x, y, sigma_x, sigma_y)
+        return Placed(x, y)
     if sighting.place not in ("ship", "north") or place not in ("north", "globe"):
         return None
     if sighting.place == "ship":
         angle = math.radians(ship.heading(time))
         sine, cosine = math.sin(angle), math.cos(angle)
         x, y = x * cosine + y * sine, y * cosine - x * sine
-        sigma_x, sigma_y = (
-            math.hypot(sigma_x * cosine, sigma_y * sine),
-            math.hypot(sigma_x * sine, sigma_y * cosine),
-        )
         if math.isnan(x):
             return None
     if place == "globe":
@@ -153,4 +147,4 @@ def placed(sighting: Sighting, time: float, ship: Ship, place: str) -> Placed | 
             return None
         latitude, longitude, _ = frame.to_geographic(x, y)
         x, y = float(latitude[0]), float(longitude[0])
-    return Placed(x, y, sigma_x, sigma_y)
+    return Placed(x, y)
