@@ -66,7 +66,7 @@ def clean(
         typer.Option(
             "-o",
             "--output",
-            help="Where to write the track: .csv, .parquet, .geojson or .gpx; repeatable.",
+            help="Where to write the track: .csv, .parquet, .geojson, .gpx or .nmea; repeatable.",
         ),
     ] = None,
     mode: Annotated[
