@@ -52,8 +52,8 @@ finite = st.floats(allow_nan=True, allow_infinity=True, width=64)
 EPOCHS = st.builds(
     Epoch,
     time=st.floats(-1e12, 1e12),
-    latitude=st.one_of(st.floats(-90, 90), st.just(math.nan)),
-    longitude=st.one_of(st.floats(-540, 540), st.just(math.nan)),
+    latitude=st.one_of(st.floats(-90, 90), st.floats()),
+    longitude=st.one_of(st.floats(-540, 540), st.floats()),
     height=finite, east=finite, north=finite, sigma_east=finite, sigma_north=finite,
     sigma_up=finite, covariance=finite, heading=finite, depth=finite, known=st.booleans(),
 )  # fmt: skip

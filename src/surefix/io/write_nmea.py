@@ -139,18 +139,13 @@ def _vtg(epoch: Epoch) -> str:
 
 
 def _gst(epoch: Epoch) -> str:
-    sigmas = epoch.sigma_north, epoch.sigma_east, epoch.sigma_up
-    if not any(map(math.isfinite, sigmas)):
-        return ""
-    fields = ",".join(_size(value) for value in sigmas)
-    return f"GST,{_time(epoch)},,{_ellipse(epoch)},{fields}"
+    sigmas = _sigmas(epoch)
+    return f"GST,{_time(epoch)},,{_ellipse(epoch)},{sigmas}" if sigmas else ""
 
 
 def _gbs(epoch: Epoch) -> str:
-    sigmas = epoch.sigma_north, epoch.sigma_east, epoch.sigma_up
-    if not any(map(math.isfinite, sigmas)):
-        return ""
-    return f"GBS,{_time(epoch)},{','.join(_size(value) for value in sigmas)},,,,"
+    sigmas = _sigmas(epoch)
+    return f"GBS,{_time(epoch)},{sigmas},,,," if sigmas else ""
 
 
 def _hdt(epoch: Epoch) -> str:
@@ -170,7 +165,7 @@ _BODIES: dict[str, Callable[[Epoch], str]] = {
 
 
 def _somewhere(epoch: Epoch) -> bool:
-    return math.isfinite(epoch.latitude) and math.isfinite(epoch.longitude)
+    return abs(epoch.latitude) <= 90.0 and math.isfinite(epoch.longitude)
 
 
 def _mode(epoch: Epoch) -> str:
@@ -199,7 +194,7 @@ def _date(epoch: Epoch) -> str:
 
 
 def _place(epoch: Epoch) -> str:
-    if not _somewhere(epoch) or abs(epoch.latitude) > 90.0:
+    if not _somewhere(epoch):
         return ",,,"
     longitude = math.remainder(epoch.longitude, 360.0)
     return f"{_degrees(epoch.latitude, 2, 'NS')},{_degrees(longitude, 3, 'EW')}"
@@ -227,6 +222,12 @@ def _angle(degrees: float) -> str:
     return f"{hundredths // 100}.{hundredths % 100:02d}"
 
 
+def _sigmas(epoch: Epoch) -> str:
+    """Standard deviations of latitude, longitude and height; empty if there are none."""
+    texts = [_size(value) for value in (epoch.sigma_north, epoch.sigma_east, epoch.sigma_up)]
+    return ",".join(texts) if any(texts) else ""
+
+
 def _ellipse(epoch: Epoch) -> str:
     """Semi-major and semi-minor axis m, and the azimuth of the major one, deg true."""
     east, north, r = epoch.sigma_east, epoch.sigma_north, epoch.covariance
@@ -240,7 +241,7 @@ def _ellipse(epoch: Epoch) -> str:
 
 
 def _size(value: float) -> str:
-    return _number(value, 3)
+    return _number(value, 3) if value >= 0.0 else ""
 
 
 def _number(value: float, decimals: int) -> str:
