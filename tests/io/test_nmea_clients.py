@@ -114,7 +114,7 @@ def free_port() -> int:
 
 
 def test_gpsd_reads_the_stream_over_tcp(free_port: int) -> None:
-    daemon = tool("gpsd")
+    daemon = tool("gpsd", "/usr/sbin/gpsd")
     port = _Port()
     command = [daemon, "-N", "-n", "-S", str(free_port), f"tcp://127.0.0.1:{port.number}"]
     running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

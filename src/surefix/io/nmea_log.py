@@ -109,7 +109,8 @@ def read_nmea(
     OptionsError
         If the log has no such target.
     """
-    reader = _Reader(path, require_checksum, _plan(path, require_checksum, target))
+    plan = _plan(path, require_checksum, target)
+    reader = _Reader(path, require_checksum, plan)
     state, done, given = START, 0, 0
     step = min(max(chunk_fixes, 1), _STEP)
     try:
