@@ -16,7 +16,7 @@ from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
-from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Velocity, keep_inputs
+from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Target, Velocity, keep_inputs
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
@@ -66,7 +66,7 @@ def clean(
         typer.Option(
             "-o",
             "--output",
-            help="Where to write the track: .csv, .parquet, .geojson or .gpx; repeatable.",
+            help="Where to write the track: .csv, .parquet, .geojson, .gpx or .nmea; repeatable.",
         ),
     ] = None,
     mode: Annotated[
@@ -149,6 +149,7 @@ def clean(
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
     iso: Annotated[bool, typer.Option("--iso", help="Write times as ISO 8601 in UTC.")] = False,
     no_checksum: NoChecksum = False,
+    target: Target = None,
     as_json: AsJson = False,
 ) -> None:
     """Clean a log: one row per fix, each with its verdict, beside the clean track."""
@@ -188,6 +189,7 @@ def clean(
             heading=heading,
             columns={**columns, **mapping(column or [])},
             require_checksum=not no_checksum,
+            target=target,
             progress=told,
         )
         done = deliver(clean_batches(sources, chosen), output or [], iso=iso)
@@ -209,6 +211,7 @@ def info(
     heading: Heading = None,
     column: Columns = None,
     no_checksum: NoChecksum = False,
+    target: Target = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what is in a log: sensors, rates, gaps, faults, and the command that cleans it."""
@@ -224,6 +227,7 @@ def info(
             heading=heading,
             columns=mapping(column or []),
             require_checksum=not no_checksum,
+            target=target,
             progress=told,
         )
     _print(found, info_lines(found), as_json)

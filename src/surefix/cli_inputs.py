@@ -9,7 +9,7 @@ import typer
 
 from surefix.errors import OptionsError
 
-__all__ = ["Columns", "Depth", "Heading", "NoChecksum", "Velocity", "keep_inputs"]
+__all__ = ["Columns", "Depth", "Heading", "NoChecksum", "Target", "Velocity", "keep_inputs"]
 
 Columns = Annotated[
     list[str] | None,
@@ -28,6 +28,13 @@ Heading = Annotated[
 ]
 NoChecksum = Annotated[
     bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
+]
+Target = Annotated[
+    str | None,
+    typer.Option(
+        help="Whose fixes to take from an acoustic log: a transponder, or ship; "
+        "default the transponder seen most often."
+    ),
 ]
 
 

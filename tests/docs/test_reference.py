@@ -12,10 +12,12 @@ import pytest
 import surefix
 from docs.pages import PAGES, ROOT
 from surefix.geo.local_frame import LocalFrame
+from surefix.io.acoustic_sentence import PROPRIETARY
 from surefix.io.nmea_record import ProblemKind
 from surefix.io.nmea_sentence import LAYOUTS
 from surefix.io.options_file import read_options
 from surefix.io.roles import ALIASES, ROLES, UNITS
+from surefix.io.write_nmea import TYPES
 from surefix.pipelines import deliver
 from surefix.pipelines.channels import channel_head
 from surefix.pipelines.options import METHODS, MULTI_HYPOTHESIS
@@ -79,6 +81,16 @@ def test_columns_are_those_that_are_recognised():
 def test_sentences_are_those_that_are_read():
     listed = words(row[0] for row in table("reference/files.md", "Input: NMEA 0183"))
     assert sorted(listed) == sorted(LAYOUTS)
+
+
+def test_acoustic_messages_are_those_that_are_read():
+    listed = words(row[0] for row in table("reference/files.md", "Input: acoustic positioning"))
+    assert sorted(listed) == sorted([*PROPRIETARY, "USBLLONG", "DVL"])
+
+
+def test_nmea_output_is_what_is_written():
+    listed = words(row[0] for row in table("reference/files.md", "Output: NMEA 0183"))
+    assert listed == [name for name in TYPES if name != "HDT"]
 
 
 def test_output_columns_are_those_that_are_written():

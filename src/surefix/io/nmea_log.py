@@ -10,6 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from surefix.errors import InputError
+from surefix.io.acoustic_clock import DeviceClock
+from surefix.io.acoustic_line import read_line
+from surefix.io.acoustic_plan import Plan, described, is_acoustic, plan_of
+from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
+from surefix.io.acoustic_rows import Sightings
 from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
 from surefix.io.nmea_epoch import Epochs
@@ -55,7 +60,7 @@ def sniff(head: bytes) -> bool:
     for _, _, text, problem in [*frames, *finish(state)]:
         if problem in ("binary", "too-long") or text.startswith(b"#"):
             continue
-        known = problem is None and _plausible(text)
+        known = _plausible(text) if problem is None else read_line(text) is not None
         good += known
         other += not known
     return good > 0 and good >= _SHARE * (good + other)
@@ -72,6 +77,7 @@ def read_nmea(
     path: Path,
     *,
     require_checksum: bool = True,
+    target: str | None = None,
     chunk_fixes: int = 50_000,
     progress: Callable[[int], None] | None = None,
 ) -> Iterator[Log]:
@@ -80,7 +86,9 @@ def read_nmea(
     Each sentence counts at its own UTC time of day, with the date nearest to its time of reception
     or, in a bare log, to the last date met. Sentences without a time get the time of reception, or
     that of the latest sentence with one. A log without any date counts from midnight of its first
-    day. Clock steps and repeated epochs are left as they are: to judge them is not reading.
+    day. In a log of an acoustic positioning system the fixes are those of one transponder, see
+    `surefix.io.acoustic_plan`. Clock steps and repeated epochs are left as they are: to judge them
+    is not reading.
 
     Parameters
     ----------
@@ -88,6 +96,8 @@ def read_nmea(
         The log.
     require_checksum
         False accepts sentences without a checksum. A wrong one is never accepted.
+    target
+        Which transponder, or ``ship``; default the one that is seen most often.
     chunk_fixes
         Rows of fixes per chunk, about.
     progress
@@ -97,8 +107,11 @@ def read_nmea(
     ------
     InputError
         If the file cannot be read.
+    OptionsError
+        If the log has no such target.
     """
-    reader = NmeaStream(path, require_checksum)
+    plan = _plan(path, require_checksum, target)
+    reader = NmeaStream(path, require_checksum, plan)
     state, done, given = START, 0, 0
     step = min(max(chunk_fixes, 1), _STEP)
     try:
@@ -121,6 +134,15 @@ def read_nmea(
         yield rest
 
 
+def _plan(path: Path, require_checksum: bool, target: str | None) -> Plan | None:
+    try:
+        if target is None and not is_acoustic(path):
+            return None
+        return plan_of(path, require_checksum=require_checksum, target=target)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}", "a readable file") from error
+
+
 class NmeaStream:
     """A log that comes in pieces, cut anywhere: what has been read and not yet given out.
 
@@ -130,22 +152,27 @@ class NmeaStream:
         Its name, which the names of sensors begin with.
     require_checksum
         As for `read_nmea`.
+    plan
+        Which acoustic target's sightings are its fixes, and how; None: those of its receivers.
     """
 
-    def __init__(self, path: Path, require_checksum: bool = True) -> None:
+    def __init__(self, path: Path, require_checksum: bool = True, plan: Plan | None = None) -> None:
         self._path = path
         self._framing = START
         self._arrival = math.nan
         self._require_checksum = require_checksum
         self._clock = LogClock()
-        self._epochs = Epochs()
+        self._plan = plan
+        self._sightings = None if plan is None else Sightings(plan)
+        self._epochs = Epochs() if self._sightings is None else self._sightings
+        self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
         self._samples = 0
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
         self._reported: set[str] = set()
         self._line = 0
-        self._take: dict[type, Callable[..., None]] = {
+        self._take: dict[type, Callable[..., object]] = {
             Position: self._position,
             Motion: self._motion,
             Heading: self._heading,
@@ -154,6 +181,9 @@ class NmeaStream:
             Depth: self._depth,
             Clock: self._time,
             Sigma: self._epochs.declare,
+            Sighting: self._sighting,
+            Attitude: self._attitude,
+            BodyVelocity: self._body_velocity,
         }
 
     @property
@@ -198,10 +228,16 @@ class NmeaStream:
         elif line != self._line:
             self._clock.receive = self._arrival
         self._line = line
-        if problem is not None:
-            self._problem(problem, line, text)
-            return
-        record = parse(text, require_checksum=self._require_checksum)
+        if problem is None:
+            record = parse(text, require_checksum=self._require_checksum)
+        else:
+            told = read_line(text) if problem == "not-nmea" else None
+            if told is None:
+                self._problem(problem, line, text)
+                return
+            before, record = told
+            if before:
+                self._received(line, before.strip())
         if isinstance(record, Refused):
             if record.kind != "unknown-type":
                 self._problem(record.kind, line, text)
@@ -209,7 +245,8 @@ class NmeaStream:
                 self._counts[record.text] = self._counts.get(record.text, 0) + 1
             return
         self._counts[record.type] = self._counts.get(record.type, 0) + 1
-        self._take[record.__class__](record)
+        if self._take[record.__class__](record) is False:
+            self._problem("other-target", line, text)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""
@@ -218,16 +255,23 @@ class NmeaStream:
             fixes=self._epochs.take(last),
             sensors=tuple(f"{self._path.stem} {name}" for name in self._epochs.sources),
             channels=tuple(self._series()),
-            problems=tuple(
-                Problem(kind, total, example, REMEDIES[kind])
-                for kind, (total, example) in self._problems.items()
-            ),
+            problems=tuple(self._told()),
             events=tuple(self._events()),
             counts=self._counts,
+            depth_positive_down=self._sightings is not None,
         )
         self._channels, self._samples, self._problems, self._counts = {}, 0, {}, {}
         self._clock.settle()
         return log
+
+    def _told(self) -> Iterator[Problem]:
+        for kind, (total, example) in self._problems.items():
+            yield Problem(kind, total, example, REMEDIES[kind])
+        lost = self._sightings.lost if self._sightings is not None else []
+        if lost and self._plan is not None:
+            example = f"{self._plan.target} at {lost[0]:.1f} s"
+            yield Problem("unplaced", len(lost), example, REMEDIES["unplaced"])
+            lost.clear()
 
     def _series(self) -> Iterator[Channel]:
         for (name, sensor), (time, value) in self._channels.items():
@@ -240,6 +284,9 @@ class NmeaStream:
             )
 
     def _events(self) -> Iterator[Event]:
+        if self._plan is not None and "plan" not in self._reported:
+            self._reported.add("plan")
+            yield Event("note", math.nan, described(self._plan))
         count = self._clock.rollovers
         if count and "rollover" not in self._reported:
             self._reported.add("rollover")
@@ -298,7 +345,33 @@ class NmeaStream:
         self._epochs.move(record, self._clock.receive)
         self._samples_of(record, speed_mps=record.speed, course_deg=record.course)
 
+    def _sighting(self, record: Sighting) -> bool | None:
+        """Take a sighting; False if it is of another target than that of the plan."""
+        if math.isnan(record.measured):
+            time = self._instant(record.second, record.day)
+        else:
+            time = self._device(record.type, record.measured, record.told)
+        return None if self._sightings is None else self._sightings.see(record, time)
+
+    def _attitude(self, record: Attitude) -> None:
+        time = self._instant(record.second, None)
+        self._sample("heading_deg", record.type, time, record.heading)
+        if self._sightings is not None:
+            self._sightings.turn(record.type, record.heading, time)
+
+    def _body_velocity(self, record: BodyVelocity) -> None:
+        time = self._device(record.type, record.measured, record.told)
+        self._sample("forward_mps", record.type, time, record.forward)
+        self._sample("starboard_mps", record.type, time, record.starboard)
+        self._sample("down_mps", record.type, time, record.down)
+        self._sample("velocity_sigma_mps", record.type, time, record.sigma)
+
+    def _device(self, name: str, measured: float, told: float) -> float:
+        return self._devices[name].at(measured, told, self._clock.now())
+
     def _heading(self, record: Heading) -> None:
+        if self._sightings is not None:
+            self._sightings.turn(record.type, record.true, self._clock.now())
         if record.type in ("HDT", "THS") or not math.isnan(record.true):
             self._samples_of(record, heading_deg=record.true)
         else:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from surefix.reasons import texts
 from surefix.types import (
     AXES,
+    BoolArray,
     CleanedChannel,
     FloatArray,
     IntArray,
@@ -20,8 +21,9 @@ from surefix.types import (
     Verdicts,
 )
 
-__all__ = ["Batch", "Form", "channel_table", "empty", "table"]
+__all__ = ["Batch", "Form", "believed", "channel_table", "empty", "table"]
 
+_WITH_A_PART = (Verdict.USED, Verdict.DOWNWEIGHTED, Verdict.EDITED)
 _WORDS = np.array([verdict.name.lower() for verdict in Verdict], dtype=object)
 
 
@@ -49,8 +51,8 @@ class Form(NamedTuple):
 class Batch(NamedTuple):
     """Some epochs of a track, and for each the verdict, sensor name and record number of its fix.
 
-    ``coordinates`` (n, 3) are the fixes as they were given: latitude, longitude, height. All but
-    the track are None for a track at times of its own.
+    ``coordinates`` (n, 3) are the fixes as they were given: latitude, longitude, height. ``known``
+    (n,) is False where no fix supports a track at times of its own; the others are None for one.
     """
 
     track: Track
@@ -59,6 +61,13 @@ class Batch(NamedTuple):
     sensor: IntArray | None = None
     row: IntArray | None = None
     coordinates: FloatArray | None = None
+    known: BoolArray | None = None
+
+
+def believed(verdicts: Verdicts) -> BoolArray:
+    """(n,) True where the fix had a part in the track, be it that the user wanted it so."""
+    part = np.isin(verdicts.verdict, _WITH_A_PART)
+    return np.asarray(part & (verdicts.weight > 0.0), dtype=np.bool_)
 
 
 def table(batch: Batch, form: Form) -> pa.Table:

@@ -3,8 +3,8 @@
 ``.csv`` and ``.parquet`` hold, in this order: ``time, x, y, z, vx, vy, vz, sigma_x, sigma_y,
 sigma_z, verdict, weight, innovation_sigma, reason``; for geographic input ``lat, lon`` and
 ``depth`` (positive down) or ``height``; then ``sensor`` and ``row``. An axis that was never
-observed stays as an empty column. ``.geojson`` and ``.gpx`` need geographic input; see their
-modules. Every file is written whole or not at all.
+observed stays as an empty column. ``.geojson``, ``.gpx`` and ``.nmea`` need geographic input; see
+their modules. Every file is written whole or not at all.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ __all__ = [
     "write_cleaned",
 ]
 
-SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx")
+SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx", ".nmea")
 
 _Add = Callable[[Batch], None]
 _AddRows = Callable[[pa.Table], None]
@@ -120,13 +120,15 @@ def write_cleaned(path: str | Path, cleaned: Cleaned, *, iso: bool = False) -> N
 @contextlib.contextmanager
 def resampled_writer(
     path: str | Path, *, geographic: bool, has_depth: bool = False, iso: bool = False
-) -> Iterator[Callable[[Track], None]]:
+) -> Iterator[Callable[..., None]]:
     """Open a file for a track at times of its own and give the function that writes parts of it.
+
+    The function takes a part and, for NMEA, whether a fix supports each of its epochs.
 
     Columns: time … sigma_z, then lat, lon, depth or height; arguments and errors as `track_writer`.
     """
     with _opened(Path(path), Form(geographic, has_depth, iso, verdicts=False)) as add:
-        yield lambda track: add(Batch(track))
+        yield lambda track, known=None: add(Batch(track, known=known))
 
 
 def write_channel(path: str | Path, channel: CleanedChannel, *, iso: bool = False) -> None:
@@ -201,6 +203,10 @@ def _sink(suffix: str, file: BinaryIO, form: Form) -> contextlib.AbstractContext
         from surefix.io.write_geojson import geojson_sink
 
         return geojson_sink(file, form)
+    if suffix == ".nmea":
+        from surefix.io.write_nmea import nmea_sink
+
+        return nmea_sink(file, form)
     from surefix.io.write_gpx import gpx_sink
 
     return gpx_sink(file, form)

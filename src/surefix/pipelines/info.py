@@ -30,13 +30,14 @@ def describe(
     heading: str | Path | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
+    target: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Look a log through and say what is in it, ready for JSON.
 
     Parameters
     ----------
-    inputs, depth, velocity, heading, columns, require_checksum, progress
+    inputs, depth, velocity, heading, columns, require_checksum, target, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
@@ -47,6 +48,7 @@ def describe(
         heading=heading,
         columns=columns,
         require_checksum=require_checksum,
+        target=target,
         progress=progress,
     )
     sources = [
@@ -67,7 +69,12 @@ def describe(
         "problems": found["problems"],
         "command": _command(
             inputs,
-            {"--depth": depth, "--velocity": velocity, "--heading": heading},
+            {
+                "--depth": depth,
+                "--velocity": velocity,
+                "--heading": heading,
+                "--target": target,
+            },
             columns,
             require_checksum,
         ),

@@ -146,7 +146,9 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     live.station, batches = receive(live.station, received)
     told = [_told(live, *what) for what in _events(batches)]
     due = now - live.shown_at >= _TICK
-    known = latest(live.station, now if due and not received else math.nan) if received or due else None
+    known = (
+        latest(live.station, now if due and not received else math.nan) if received or due else None
+    )
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
         live.now, live.shown_at = known, now
