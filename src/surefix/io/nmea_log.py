@@ -14,6 +14,7 @@ from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
 from surefix.io.nmea_epoch import Epochs
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
+from surefix.io.nmea_lines import Plain, pieces
 from surefix.io.nmea_record import (
     REMEDIES,
     AlongSpeed,
@@ -103,12 +104,12 @@ def read_nmea(
     try:
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
-                state, frames = frame(state, block)
-                for at in range(0, len(frames), step):
-                    reader.add(frames[at : at + step])
-                    if reader.size >= chunk_fixes:
-                        yield reader.chunk()
-                        given += 1
+                for state, found in pieces(state, block):
+                    for at in range(0, len(found), step):
+                        reader.add(found[at : at + step])
+                        if reader.size >= chunk_fixes:
+                            yield reader.chunk()
+                            given += 1
                 done += len(block)
                 if progress is not None:
                     progress(done)
@@ -150,10 +151,14 @@ class _Reader:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
-    def add(self, frames: Sequence[Frame]) -> None:
-        """Read the next frames."""
-        for item in frames:
-            self._add(item)
+    def add(self, found: Sequence[Frame | Plain]) -> None:
+        """Read the next frames or plain lines."""
+        for item in found:
+            if len(item) == 3:
+                self._line, self._clock.receive, record = item
+                self._heed(record)
+            else:
+                self._add(item)
 
     def _add(self, item: Frame) -> None:
         line, prefix, text, problem = item
@@ -166,14 +171,19 @@ class _Reader:
             self._problem(problem, line, text)
             return
         record = parse(text, require_checksum=self._require_checksum)
-        if isinstance(record, Refused):
-            if record.kind != "unknown-type":
-                self._problem(record.kind, line, text)
-            else:
-                self._counts[record.text] = self._counts.get(record.text, 0) + 1
-            return
-        self._counts[record.type] = self._counts.get(record.type, 0) + 1
-        self._take[record.__class__](record)
+        if not isinstance(record, Refused):
+            self._heed(record)
+        elif record.kind == "unknown-type":
+            self._heed(record.text)
+        else:
+            self._problem(record.kind, line, text)
+
+    def _heed(self, record: Record | str) -> None:
+        """Take a record in, or count the type of one that is not known."""
+        kind = record if isinstance(record, str) else record.type
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        if not isinstance(record, str):
+            self._take[record.__class__](record)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""
