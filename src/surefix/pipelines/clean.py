@@ -145,6 +145,8 @@ def _batches(session: _Session, chunks: list[Chunk], *, final: bool) -> Iterator
     """Clean what was read, in real time in portions of bounded size."""
     parts = [chunk.rows for chunk in chunks if chunk.rows is not None]
     rows = join_rows(parts) if parts else None
+    chunks[:] = [chunk._replace(rows=None) for chunk in chunks]  # joined: none is kept twice
+    del parts
     portions: list[Rows | None] = [rows]
     if session.options.mode == "realtime" and rows is not None and len(rows.tau) > _PORTION:
         starts = range(0, len(rows.tau), _PORTION)
