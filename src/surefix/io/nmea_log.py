@@ -19,6 +19,7 @@ from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
 from surefix.io.nmea_epoch import Epochs
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
+from surefix.io.nmea_lines import Plain, pieces
 from surefix.io.nmea_record import (
     REMEDIES,
     AlongSpeed,
@@ -117,12 +118,12 @@ def read_nmea(
     try:
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
-                state, frames = frame(state, block)
-                for at in range(0, len(frames), step):
-                    reader.add(frames[at : at + step])
-                    if reader.size >= chunk_fixes:
-                        yield reader.chunk()
-                        given += 1
+                for state, found in pieces(state, block):
+                    for at in range(0, len(found), step):
+                        reader.add(found[at : at + step])
+                        if reader.size >= chunk_fixes:
+                            yield reader.chunk()
+                            given += 1
                 done += len(block)
                 if progress is not None:
                     progress(done)
@@ -172,7 +173,7 @@ class NmeaStream:
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
         self._reported: set[str] = set()
         self._line = 0
-        self._take: dict[type, Callable[..., object]] = {
+        self._take: dict[type, Callable[..., bool | None]] = {
             Position: self._position,
             Motion: self._motion,
             Heading: self._heading,
@@ -216,10 +217,14 @@ class NmeaStream:
         self._framing = START
         return self.chunk(last=True)
 
-    def add(self, frames: Sequence[Frame]) -> None:
-        """Read the next frames."""
-        for item in frames:
-            self._add(item)
+    def add(self, found: Sequence[Frame | Plain]) -> None:
+        """Read the next frames or plain lines."""
+        for item in found:
+            if len(item) == 3:
+                self._line, self._clock.receive, record = item
+                self._heed(record)
+            else:
+                self._add(item)
 
     def _add(self, item: Frame) -> None:
         line, prefix, text, problem = item
@@ -238,15 +243,19 @@ class NmeaStream:
             before, record = told
             if before:
                 self._received(line, before.strip())
-        if isinstance(record, Refused):
-            if record.kind != "unknown-type":
-                self._problem(record.kind, line, text)
-            else:
-                self._counts[record.text] = self._counts.get(record.text, 0) + 1
-            return
-        self._counts[record.type] = self._counts.get(record.type, 0) + 1
-        if self._take[record.__class__](record) is False:
-            self._problem("other-target", line, text)
+        if not isinstance(record, Refused):
+            if self._heed(record) is False:
+                self._problem("other-target", line, text)
+        elif record.kind == "unknown-type":
+            self._heed(record.text)
+        else:
+            self._problem(record.kind, line, text)
+
+    def _heed(self, record: Record | str) -> bool | None:
+        """Take a record in, or count the type of one that is not known; False: of no target."""
+        kind = record if isinstance(record, str) else record.type
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        return None if isinstance(record, str) else self._take[record.__class__](record)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""

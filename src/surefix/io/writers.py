@@ -19,7 +19,7 @@ import pyarrow as pa
 from surefix.errors import OutputError
 from surefix.io import write_csv, write_parquet
 from surefix.io.atomic import replacing
-from surefix.io.records import Batch, Form, channel_table
+from surefix.io.records import Batch, Form, channel_table, parts
 from surefix.types import Cleaned, CleanedChannel, FloatArray, IntArray, Track, Verdicts
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
 
 SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx", ".nmea")
 
+_ROWS = 250_000  # epochs that are put into words at a time
 _Add = Callable[[Batch], None]
 _AddRows = Callable[[pa.Table], None]
 
@@ -67,7 +68,9 @@ class TrackWriter:
             (n, 3) the fixes as they were given, latitude deg, longitude deg, height m: where
             GeoJSON and GPX put them. None: on the track (GeoJSON) or nowhere (GPX).
         """
-        self._add(Batch(track, verdicts, tuple(sensors), sensor, row, coordinates))
+        whole = Batch(track, verdicts, tuple(sensors), sensor, row, coordinates)
+        for part in parts(whole, _ROWS):
+            self._add(part)
 
 
 @contextlib.contextmanager

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import platform
 from dataclasses import fields
-from functools import cache
 from importlib.metadata import version
 
 import numpy as np
@@ -96,10 +96,11 @@ def settings(options: CleanOptions, setup: Setup | None) -> dict[str, str]:
         for name, value in used.items()
         if value is not None and value != {}
     }
-    out["python"] = platform.python_version()
     return out | _versions()
 
 
-@cache
+@functools.cache
 def _versions() -> dict[str, str]:
-    return {name: version(name) for name in _VERSIONS}
+    """Versions of what the figures depend on; looked up once, for that takes a while."""
+    found = {name: version(name) for name in _VERSIONS}
+    return {"python": platform.python_version(), **found}
