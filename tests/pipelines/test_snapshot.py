@@ -13,6 +13,7 @@ from surefix.io.table import from_frame
 from surefix.pipelines.options import METHODS
 from surefix.pipelines.session import advance, begin_session
 from surefix.pipelines.snapshot import restored, snapshot
+from surefix.pipelines.state import Session
 
 REALTIME = [method for method in METHODS if method not in ("53h", "hampel")]
 
@@ -40,7 +41,7 @@ def test_stored_between_any_two_parts_it_gives_the_same(method):
     _, whole = run(begun, [*parts(frame, sizes), None])
     session, given = begun, []
     for part in [*parts(frame, sizes), None]:
-        stored = restored(snapshot(session))
+        stored = restored(snapshot(session), Session)
         assert same(stored, session)
         session, batches = advance(stored, 0, part)
         given += batches
@@ -55,7 +56,7 @@ def test_geographic_logs_and_several_inputs_are_stored_too():
     session = begin_session([("log", "fixes"), ("depth", "depth")], OPTIONS)
     session, given = run(session, parts(frame, [200]))
     session, more = advance(session, 1, beside)
-    assert same(restored(snapshot(session)), session)
+    assert same(restored(snapshot(session), Session), session)
     assert len(table([*given, *more])) > 100
 
 
@@ -65,16 +66,16 @@ def test_what_is_damaged_is_refused():
     rng = np.random.default_rng(1)
     for at in [*range(24), *rng.integers(0, len(stored), 200)]:
         with pytest.raises(InputError, match="snapshot"):
-            restored(stored[:at])
+            restored(stored[:at], Session)
         changed = bytearray(stored)
         changed[at] ^= 1 << int(rng.integers(0, 8))
         with pytest.raises(InputError, match="snapshot"):
-            restored(bytes(changed))
+            restored(bytes(changed), Session)
 
 
 def test_a_pickle_is_never_loaded():
     with pytest.raises(InputError, match="no snapshot"):
-        restored(pickle.dumps({"surefix": 1}))
+        restored(pickle.dumps({"surefix": 1}), Session)
 
 
 def test_an_estimator_cannot_be_stored():

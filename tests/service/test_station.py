@@ -17,7 +17,7 @@ from surefix.pipelines.options import CleanOptions
 from surefix.service.addresses import Address
 from surefix.service.journal import Received
 from surefix.service.options import InputOptions, LiveOptions
-from surefix.service.station import begin_station, latest, receive
+from surefix.service.station import begin_station, latest, receive, resumed, stored
 
 CLEAN = CleanOptions(mode="realtime", settle_rows=40, reorder_s=2.0)
 
@@ -165,3 +165,20 @@ def test_arrival_dates_what_has_no_date():
         given += batches
     time = join(given).track.time
     assert time[0] == pytest.approx(noon, abs=5.0)
+
+
+def test_stored_between_any_two_pieces_it_goes_on_as_if_nothing_had_happened():
+    inputs = (InputOptions(name="boat", address=Address("file")),)
+    options = LiveOptions(clean=CLEAN, inputs=inputs)
+    station, other = begin_station(options), begin_station(options)
+    given, again = [], []
+    parts = [*pieces(recorded(), 300, np.random.default_rng(9)), b""]
+    for number, data in enumerate(parts, 1):
+        piece = [Received(number, 0, math.nan, data)]
+        station, batches = receive(station, piece)
+        given += batches
+        other, batches = receive(resumed(options, stored(other)), piece)
+        again += batches
+        assert stored(other) == stored(station)
+    pd.testing.assert_frame_equal(table(join(given)), table(join(again)), check_exact=True)
+    series_equal(join(given), join(again))

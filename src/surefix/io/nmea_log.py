@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,10 @@ __all__ = ["NmeaStream", "read_nmea", "sniff"]
 _BLOCK = 1 << 18
 _STEP = 256  # frames between two looks at the size of a chunk
 _UNDATED = 500  # rows of a stream that wait for the first date
+_STATE = (
+    "_framing", "_clock", "_epochs", "_devices", "_samples", "_channels", "_counts", "_problems",
+    "_reported", "_line",
+)  # fmt: skip
 _SAMPLES_PER_FIX = 10  # a chunk also ends after so many channel samples per fix it may hold
 _ANGLES = frozenset({"heading_deg", "heading_magnetic_deg", "course_deg"})
 _SHARE = 0.3
@@ -186,6 +190,17 @@ class NmeaStream:
             Attitude: self._attitude,
             BodyVelocity: self._body_velocity,
         }
+
+    @property
+    def state(self) -> dict[str, object]:
+        """What it remembers, plain data that can be stored; `resume` goes on from it."""
+        return {name: getattr(self, name) for name in _STATE}
+
+    def resume(self, state: Mapping[str, object]) -> None:
+        """Go on from a state of a stream of the same name and plan."""
+        for name in _STATE:
+            setattr(self, name, state[name])
+        self._take[Sigma] = self._epochs.declare
 
     @property
     def size(self) -> float:

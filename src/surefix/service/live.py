@@ -12,7 +12,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -90,9 +90,9 @@ def begin_live(options: LiveOptions) -> Live:
     journal = open_journal(options.journal)
     journal.begin([(each.name, each.role) for each in options.inputs])
     station = begin_station(options)
-    for after, snapshot in journal.snapshots():
+    for _, snapshot in journal.snapshots():
         try:
-            station = replace(resumed(options, snapshot), after=after)
+            station = resumed(options, snapshot)
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
@@ -145,10 +145,7 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
     told = [_told(live, *what) for what in _events(batches)]
-    due = now - live.shown_at >= _TICK
-    known = (
-        latest(live.station, now if due and not received else math.nan) if received or due else None
-    )
+    known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
         live.now, live.shown_at = known, now
@@ -161,6 +158,20 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     await _write(live)
     for output, text in fresh:
         output.send(text)
+
+
+def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
+    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick."""
+    known = latest(live.station) if fresh else None
+    behind = live.now is not None and (known is None or known.time <= live.now.time)
+    if not behind or now - live.shown_at < _TICK or _recorded(live):
+        return known
+    return latest(live.station, now)
+
+
+def _recorded(live: Live) -> bool:
+    """Whether a recorded log is replayed, whose time is not the present one."""
+    return any(line.address.kind == "file" for line in live.lines)
 
 
 def _told(live: Live, at: float, kind: str, text: str) -> Told:
@@ -180,13 +191,18 @@ def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
         return Epoch(known.time, known=False)
     latitude, longitude, height = known.geodetic
+    east, north, _ = known.velocity
+    sigma_east, sigma_north, sigma_up = known.sigma_position
     return Epoch(
-        known.time,
-        float(latitude),
-        float(longitude),
-        float(height),
-        *(float(v) for v in known.velocity[:2]),
-        *(float(s) for s in known.sigma_position),
+        time=known.time,
+        latitude=float(latitude),
+        longitude=float(longitude),
+        height=float(height),
+        east=float(east),
+        north=float(north),
+        sigma_east=float(sigma_east),
+        sigma_north=float(sigma_north),
+        sigma_up=float(sigma_up),
         known=known.time - known.observed <= _STALE,
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -18,12 +18,13 @@ import numpy as np
 
 from surefix.io.nmea_log import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
+from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
 from surefix.service.journal import Received
 from surefix.service.options import LiveOptions
 from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
-__all__ = ["Latest", "Station", "begin_station", "latest", "receive"]
+__all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,36 @@ def begin_station(options: LiveOptions) -> Station:
     inputs = [(each.name, each.role) for each in options.inputs]
     streams = tuple(NmeaStream(Path(each.name), each.require_checksum) for each in options.inputs)
     return Station(begin_session(inputs, options.clean), streams)
+
+
+class _Stored(NamedTuple):
+    """A station that is stored."""
+
+    session: Session
+    streams: tuple[Mapping[str, object], ...]
+    after: int
+    observed: float
+
+
+def stored(station: Station) -> bytes:
+    """Everything that is known, to be stored."""
+    states = tuple(stream.state for stream in station.streams)
+    return snapshot(_Stored(station.session, states, station.after, station.observed))
+
+
+def resumed(options: LiveOptions, content: bytes) -> Station:
+    """Stand where a station stood that was stored with the same options.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or of another version.
+    """
+    known = restored(content, _Stored)
+    streams = begin_station(options).streams
+    for stream, state in zip(streams, known.streams, strict=True):
+        stream.resume(state)
+    return Station(known.session, streams, known.after, known.observed)
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
