@@ -17,6 +17,7 @@ from typer.exceptions import TyperException
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Target, Velocity, keep_inputs
+from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
@@ -279,6 +280,7 @@ def reproduce(
 
 app.command()(compare)
 app.command()(locate)
+app.command()(live)
 
 
 def main() -> None:

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from surefix.api import to_table
+from surefix.io.journal import Received
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.joining import join
 from surefix.pipelines.options import CleanOptions
 from surefix.service.addresses import Address
-from surefix.service.journal import Received
 from surefix.service.options import InputOptions, LiveOptions
 from surefix.service.station import begin_station, latest, receive, resumed, stored
 
@@ -45,8 +45,9 @@ def recorded(n=150, seed=1):
         lines.append(sentence(f"HEHDT,{(350.0 + 0.2 * k + rng.normal()) % 360.0:.2f},T"))
     for k in rng.choice(np.arange(130, len(lines) - 4), 12, replace=False):
         lines[k], lines[k + 3] = lines[k + 3], lines[k]
-    lines[300] = lines[300][:20] + b"\r\n"
-    lines.insert(330, lines[329])
+    middle = len(lines) * 2 // 3
+    lines[middle] = lines[middle][:20] + b"\r\n"
+    lines.insert(middle + 30, lines[middle + 29])
     return b"".join(lines)
 
 

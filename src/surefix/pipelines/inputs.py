@@ -14,6 +14,7 @@ from surefix.geo.angle import wrap
 from surefix.geo.local_frame import rotate
 from surefix.io.columns import Role
 from surefix.io.nmea_log import read_nmea, sniff
+from surefix.io.sqlite_file import is_sqlite
 from surefix.io.table import from_frame, read_table
 from surefix.pipelines.channels import ChannelState, clean_channel
 from surefix.pipelines.clean import Source
@@ -72,7 +73,12 @@ def open_inputs(
     opener = _Opener(dict(columns or {}), require_checksum, target, progress)
     given = {"depth": depth, "velocity": velocity, "heading": heading}
     opener.check({role for role, data in given.items() if data is not None})
-    sources = [Source(opener.open(data, "fixes"), "fixes", _name(data)) for data in inputs]
+    sources: list[Source] = []
+    for data in inputs:
+        if isinstance(data, str | Path) and is_sqlite(Path(data)):
+            sources += _journalled(Path(data), require_checksum)
+        else:
+            sources.append(Source(opener.open(data, "fixes"), "fixes", _name(data)))
     if depth is not None:
         sources.append(Source(opener.open(depth, "depth"), "depth", _name(depth, "depth")))
     if heading is not None and not any(_same(heading, data) for data in inputs):
@@ -84,6 +90,16 @@ def open_inputs(
         logs = _earth_frame(opener.open(velocity, "velocity"), turning)
         sources.append(Source(logs, "velocity", _name(velocity, "velocity")))
     return sources
+
+
+def _journalled(place: Path, require_checksum: bool) -> list[Source]:
+    """The inputs of a live service from its journal, as they were received."""
+    from surefix.io.journal import journal_logs
+
+    return [
+        Source(logs, role, name)
+        for name, role, logs in journal_logs(place, require_checksum=require_checksum)
+    ]
 
 
 def _name(data: Data, role: str = "table") -> str:

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from surefix.errors import InputError, OutputError
+from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
-from surefix.service.journal import Journal, Received, Told, open_journal
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
 from surefix.service.station import (
@@ -33,7 +33,7 @@ from surefix.service.station import (
 )
 from surefix.types import Cleaned
 
-__all__ = ["Live", "begin_live", "run_live"]
+__all__ = ["Live", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
 _STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from surefix.errors import InputError, OptionsError, OutputError
-from surefix.service.journal import Received, Told, open_journal
+from surefix.io.journal import Received, Told, open_journal
 
 INPUTS = [("gnss", "fixes"), ("sounder", "depth")]
 
@@ -102,7 +102,7 @@ def test_a_damaged_file_is_put_aside(url, tmp_path):
 
 _WRITER = """
 import sys
-from surefix.service.journal import Received, Told, open_journal
+from surefix.io.journal import Received, Told, open_journal
 journal = open_journal(sys.argv[1])
 n = journal.last()[0]
 while True:

@@ -32,8 +32,11 @@ from sqlalchemy.engine import Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, SQLAlchemyError
 
 from surefix.errors import InputError, OptionsError, OutputError
+from surefix.io.nmea_log import NmeaStream
+from surefix.io.sqlite_file import is_sqlite
+from surefix.types import Log
 
-__all__ = ["Journal", "Received", "Told", "is_journal", "open_journal"]
+__all__ = ["Journal", "Received", "Told", "journal_logs", "open_journal"]
 
 _TABLES = MetaData()
 _NUMBER = BigInteger().with_variant(Integer, "sqlite")
@@ -162,14 +165,24 @@ class Journal:
         with self._reading() as connection:
             return [(int(after), bytes(stored)) for after, stored in connection.execute(newest)]
 
-    def received(self, after: int = 0) -> Iterator[Received]:
-        """Give what was received after the bytes of a number, in the order of arrival."""
+    def received(self, after: int = 0, source: int | None = None) -> Iterator[Received]:
+        """Give what was received after the bytes of a number, in the order of arrival.
+
+        Parameters
+        ----------
+        after
+            The number.
+        source
+            Only of this input; None: of all.
+        """
         while True:
             query = select(_RECEIVED).where(_RECEIVED.c.number > after)
+            if source is not None:
+                query = query.where(_RECEIVED.c.source == source)
             with self._reading() as connection:
                 rows = connection.execute(query.order_by(_RECEIVED.c.number).limit(_READ)).all()
-            for number, source, at, data in rows:
-                yield Received(int(number), int(source), _time(at), bytes(data))
+            for number, sender, at, data in rows:
+                yield Received(int(number), int(sender), _time(at), bytes(data))
             if len(rows) < _READ:
                 return
             after = int(rows[-1][0])
@@ -259,7 +272,7 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
             f"journal {url!r}", "sqlite:///PATH or postgresql://USER@HOST/NAME"
         ) from error
     place = Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else None
-    if place is not None and not new and not is_journal(place):
+    if place is not None and not new and not is_sqlite(place):
         raise InputError(f"{place}: not a journal", "a file that surefix live has written")
     if place is not None and place.exists() and not _sound(place):
         aside = f"{place.name}.damaged-{time.strftime('%Y%m%dT%H%M%S')}"
@@ -276,13 +289,29 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
     return Journal(engine)
 
 
-def is_journal(path: Path) -> bool:
-    """Whether a file is a SQLite data base."""
-    try:
-        with path.open("rb") as file:
-            return file.read(16) == b"SQLite format 3\0"
-    except OSError:
-        return False
+def journal_logs(
+    path: Path, *, require_checksum: bool = True
+) -> list[tuple[str, str, Iterator[Log]]]:
+    """Open the inputs of a journal for reading: name and role of each, and its parts.
+
+    Raises
+    ------
+    InputError
+        It is no journal.
+    """
+    journal = open_journal(f"sqlite:///{path}", new=False)
+
+    def parts(number: int, name: str) -> Iterator[Log]:
+        stream = NmeaStream(Path(name), require_checksum)
+        for piece in journal.received(source=number):
+            if piece.data:
+                yield stream.read(piece.data, piece.time)
+        yield stream.rest()
+
+    sources = journal.sources()
+    if not sources:
+        raise InputError(f"{path}: a data base without inputs", "a journal of surefix live")
+    return [(name, role, parts(i, name)) for i, (name, role) in enumerate(sources)]
 
 
 def _durable(connection: object, _record: object) -> None:
