@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surefix.io.acoustic_record import Attitude, Sighting
@@ -165,6 +165,7 @@ def test_gaps_depth_counts_only_where_it_is_one() -> None:
     assert math.isnan(seen(body.format("10.0,0")).depth)
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 50), st.floats(0.1, 50), st.floats(0, 180))
 def test_error_ellipse_turned_to_east_and_north(major: float, minor: float, turn: float) -> None:
     body = f"PSONLLD,120000.0,24,A,50.0,8.8,425.3,{major:.6f},{minor:.6f},{turn:.6f},0.5,,,,"
