@@ -7,6 +7,7 @@ import pytest
 
 from acceptance.product import clean, read, surefix, told_in_one_line
 from acoustic_logs import HOME, dvl, line, mission, received, vehicle
+from surefix import api
 from surefix.geo.time import parse_time
 from surefix.io.nmea_log import read_nmea
 from surefix.io.nmea_sentence import LAYOUTS
@@ -64,6 +65,7 @@ def test_target_on_the_command_line(dive, tmp_path):
     assert set(read(tmp_path / "out.csv")["sensor"]) == {"dive B02"}
     wrong = surefix("clean", dive, "--target", "B09")
     assert "B01, B02, ship" in told_in_one_line(wrong)
+    assert api.clean(dive, target="B02").sensors == ("dive B02",)
     named = surefix("info", dive, "--target", "B02")
     assert "--target B02" in named.out
 

@@ -124,11 +124,6 @@ def test_between_two_times_of_the_log_the_device_goes_on_by_itself() -> None:
     assert times == pytest.approx([1.7e9 - 0.5, 1.7e9 + 0.5, 1.7e9 + 1.5], abs=1e-6)
 
 
-def test_without_any_time_only_a_calendar_is_believed() -> None:
-    assert DeviceClock().at(1.7e9, 1.7e9 + 0.1, math.nan) == 1.7e9
-    assert math.isnan(DeviceClock().at(12.0, 12.1, math.nan))
-
-
 def test_usbllong_writer_of_the_tests_is_right() -> None:
     record = said(evologics(20.0, 19.5, 1.0, 2.0, -3.0))
     assert isinstance(record, Sighting)

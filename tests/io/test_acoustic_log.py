@@ -227,6 +227,25 @@ def test_dvl_alone_and_in_a_mixture(tmp_path: Path) -> None:
     assert log_of(tmp_path, mission(DAY, 0.0, 10)).fixes is not None
 
 
+def test_a_device_dates_a_log_that_begins_with_it(tmp_path: Path) -> None:
+    """Its calendar gives the day; a device that counts from its start has no time until then."""
+    lines = [dvl(DAY + START - 5 + 3 * k + 0.2, DAY + START - 5 + 3 * k) for k in range(2)]
+    for second in range(5):
+        lines += [gga(second, START), dvl(DAY + START + second + 0.3, DAY + START + second + 0.1)]
+    lines.append(line("GPZDA,110645.00,14,05,2024,00,00"))
+    log = log_of(tmp_path, lines)
+    expected = [-5.0, -2.0, *np.arange(5) + 0.1]
+    forward = next(c for c in log.channels if c.name == "forward_mps")
+    np.testing.assert_allclose(forward.time - DAY - START, expected, atol=1e-5)
+    np.testing.assert_allclose(fixes_of(log).time - DAY - START, np.arange(5), atol=1e-6)
+    assert log.events == ()
+    early = log_of(tmp_path, [dvl(12.3, 12.1), *lines[2:]])
+    forward = next(c for c in early.channels if c.name == "forward_mps")
+    assert math.isnan(forward.time[0])
+    # Undated until the end: told 0.3 s after the fix of the ship, but taken to be told with it.
+    np.testing.assert_allclose(forward.time[1:] - DAY - START, np.arange(5) - 0.2, atol=1e-5)
+
+
 def test_sniff_knows_lines_of_other_protocols() -> None:
     assert sniff(b"".join(dvl(100.2 + k, 100.0 + k) for k in range(5)))
     assert sniff(evologics(20.0, 19.5, 1.0, 2.0, -3.0) * 3)

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surefix.io.acoustic_record import Attitude, Sighting
@@ -37,6 +37,8 @@ PUBLISHED = {
         ("M17 filtered", "north", 0.0, 0.0, 0.0, 20.0, False),
     "$PSIMSSB,094532.523,M17,V,NRy,C,N,M,,,,,T,0.002245,*25":
         ("M17", "north", NAN, NAN, NAN, NAN, False),
+    "$PSIMSSB,094532.523,M21,V,NRy,D,N,M,,,,,N,,*22":
+        ("M21", "globe", NAN, NAN, NAN, NAN, False),
     "$PTSAG,#16068,124544.449,18,12,2017,1,4305.25355,N,00631.76852,E,F,1013.10,1,9999.00*23":
         ("1", "globe", 43 + 5.25355 / 60, 6 + 31.76852 / 60, 1013.1, NAN, True),
     "$PTSAG,#2374110,055648.831,05,04,2018,0,2718.19917,N,01747.61373,W,F,0005.8,1,9999.0*39":
@@ -163,6 +165,7 @@ def test_gaps_depth_counts_only_where_it_is_one() -> None:
     assert math.isnan(seen(body.format("10.0,0")).depth)
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 50), st.floats(0.1, 50), st.floats(0, 180))
 def test_error_ellipse_turned_to_east_and_north(major: float, minor: float, turn: float) -> None:
     body = f"PSONLLD,120000.0,24,A,50.0,8.8,425.3,{major:.6f},{minor:.6f},{turn:.6f},0.5,,,,"

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from acoustic_logs import dvl, evologics, gga, hdt, line, mission, received, ssb
 from surefix.geo.time import parse_time
 from surefix.io.acoustic_line import read_line
+from surefix.io.acoustic_plan import is_acoustic
 from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
 from surefix.io.nmea import parse
 from surefix.io.nmea_frame import START, finish, frame
@@ -187,3 +188,16 @@ def test_what_waits_is_bounded(tmp_path: Path) -> None:
     path.write_bytes(b"".join(lines[:2] * 2 + lines[2:] + lines[:2]))
     total = sum(len(log.fixes.time) for log in read_nmea(path, chunk_fixes=500) if log.fixes)
     assert total == 6_000
+
+
+@pytest.mark.parametrize(
+    "text", [text for text in LINES if b"$GP" not in text and b"$HE" not in text]
+)
+def test_messages_are_found_wherever_they_lie(tmp_path: Path, text: bytes) -> None:
+    path = tmp_path / "long.log"
+    for before in (0, 1, (1 << 20) - 5, (1 << 20) - 4, (1 << 21) + 7):
+        filler = (gga(1.0, 40_000.0) * (before // 60 + 1))[:before]
+        path.write_bytes(filler + text)
+        assert is_acoustic(path)
+        path.write_bytes(filler)
+        assert not is_acoustic(path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pynmea2
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surefix.errors import OptionsError, OutputError
@@ -59,6 +59,7 @@ EPOCHS = st.builds(
 )  # fmt: skip
 
 
+@settings(deadline=None)
 @given(EPOCHS)
 def test_whatever_the_numbers_sentences_are_sound(epoch: Epoch) -> None:
     for text in sentences(epoch, types=ALL).splitlines(keepends=True):
@@ -79,6 +80,7 @@ def test_the_longest_sentences_fit() -> None:
         assert len(text) <= LONGEST, text
 
 
+@settings(deadline=None)
 @given(
     latitude=st.floats(-90, 90),
     longitude=st.floats(-180, 180),
@@ -172,6 +174,7 @@ def test_standing_still_has_no_course() -> None:
     assert one(still, "VTG")[1:6] == ["", "T", "", "M", "0.00"]
 
 
+@settings(deadline=None)
 @given(st.floats(0.01, 30), st.floats(0.01, 30), st.floats(0, math.pi))
 def test_ellipse_is_that_of_the_covariance(major: float, minor: float, turn: float) -> None:
     major, minor = max(major, minor), min(major, minor)

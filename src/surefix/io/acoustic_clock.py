@@ -29,11 +29,11 @@ class DeviceClock:
     offset: float = math.nan
 
     def at(self, measured: float, told: float, now: float) -> float:
-        """Instant of a measurement, s; NaN if nothing in the log can say it.
+        """Instant of a measurement, s.
 
         A device that is set right is believed. Another one is only believed about how long ago the
         measurement was when the line was written, and that was ``now``: exact where the log says
-        when each line was received, else late by what has passed since the sentence before that
+        when each line was received, else early by what has passed since the sentence before that
         has a time.
 
         Parameters
@@ -41,14 +41,12 @@ class DeviceClock:
         measured, told
             s on the device's clock: of the measurement, and of the writing of the line.
         now
-            s, the log's time of the line; NaN if it has none yet.
+            s, the log's time of the line.
 
         >>> clock = DeviceClock()
         >>> clock.at(12.5, 13.0, 1000.0), clock.at(14.5, 15.0, 1002.0)
         (999.5, 1001.5)
         """
-        if not math.isnan(now) and now != self.reference:
+        if now != self.reference:
             self.reference, self.offset = now, now - told
-        if math.isnan(self.offset):
-            return measured if measured >= CALENDAR else math.nan
         return measured if abs(self.offset) <= _AGREE else measured + self.offset

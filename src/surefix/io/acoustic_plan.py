@@ -12,6 +12,8 @@ from math import isnan
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from surefix.errors import OptionsError
 from surefix.io.acoustic_line import read_line
 from surefix.io.acoustic_record import NOT_MEASURED, Attitude, Place, Sighting
@@ -26,10 +28,11 @@ __all__ = ["SHIP", "Plan", "described", "is_acoustic", "plan_of"]
 SHIP = "ship"
 """Target that means the ship's own positions."""
 
-_MARKS = (b"PSIMS", b"PTSA", b"PSONLLD,", b"PSONALL,", b"USBLLONG,", b"velocity_valid")
+_MARKS = (b"$PSIMS", b"$PTSA", b"$PSONLLD,", b"$PSONALL,", b"+++AT:", b"velocity_valid")
 _LONGEST = max(map(len, _MARKS))
 _BLOCK = 1 << 20
 _NO_RANK = 9
+_DOLLAR_P = int.from_bytes(b"$P", "little")
 
 
 class Plan(NamedTuple):
@@ -82,10 +85,19 @@ def is_acoustic(path: Path) -> bool:
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
             seen = tail + block
-            if any(mark in seen for mark in _MARKS):
+            if _suspect(seen) and any(mark in seen for mark in _MARKS):
                 return True
             tail = seen[-_LONGEST:]
     return False
+
+
+def _suspect(block: bytes) -> bool:
+    """Whether a block may hold one of the marks; told by a byte or two, which is quick."""
+    if b"{" in block or b"+" in block:
+        return True
+    even, odd = len(block) // 2, (len(block) - 1) // 2
+    pairs = (np.frombuffer(block, "<u2", count, at) for count, at in ((even, 0), (odd, 1)))
+    return any(bool((pair == _DOLLAR_P).any()) for pair in pairs)
 
 
 def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan | None:

@@ -160,7 +160,7 @@ PROPRIETARY: dict[str, Layout] = {
     "PSIMSSB": Layout(
         _fields(
             _TIME, _NAME, "([AV])", "([^,*]{0,8})",
-            rf"(?:(D),([A-Z]),([MFP]),{_LATITUDE},{_LONGITUDE}"
+            rf"(?:(D),([A-Z]),([MFP]),(?:{_LATITUDE},{_LONGITUDE}|,)"
             rf"|([A-CE-Z]),([A-Z]),([MFP]),{_NUMBER},{_NUMBER})",
             _NUMBER, _SIZE,
         ),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from surefix.errors import InputError
-from surefix.io.acoustic_clock import DeviceClock
+from surefix.io.acoustic_clock import CALENDAR, DeviceClock
 from surefix.io.acoustic_line import read_line
 from surefix.io.acoustic_plan import Plan, described, is_acoustic, plan_of
 from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
@@ -170,6 +170,7 @@ class NmeaStream:
         self._plan = plan
         self._sightings = None if plan is None else Sightings(plan)
         self._epochs = Epochs() if self._sightings is None else self._sightings
+        self._led = math.nan  # time that a device has given to the log
         self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
         self._samples = 0
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
@@ -391,7 +392,15 @@ class NmeaStream:
         self._sample("velocity_sigma_mps", record.type, time, record.sigma)
 
     def _device(self, name: str, measured: float, told: float) -> float:
-        return self._devices[name].at(measured, told, self._clock.now())
+        """Instant of a measurement; a device's calendar dates a log that has no time yet."""
+        now = self._clock.now()
+        if not math.isnan(now) and now != self._led:
+            return self._devices[name].at(measured, told, now)
+        if measured < CALENDAR:
+            return math.nan
+        self._led = self._clock.latest = measured
+        self._clock.dated = True
+        return measured
 
     def _heading(self, record: Heading) -> None:
         if self._sightings is not None:
