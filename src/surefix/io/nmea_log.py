@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -105,8 +105,11 @@ def read_nmea(
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
                 for state, found in pieces(state, block):
-                    for at in range(0, len(found), step):
-                        reader.add(found[at : at + step])
+                    if isinstance(found, Plain):
+                        reader.count(found.unknown)
+                    some = found.records if isinstance(found, Plain) else found
+                    for at in range(0, len(some), step):
+                        reader.add(some[at : at + step])
                         if reader.size >= chunk_fixes:
                             yield reader.chunk()
                             given += 1
@@ -151,8 +154,13 @@ class _Reader:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
-    def add(self, found: Sequence[Frame | Plain]) -> None:
-        """Read the next frames or plain lines."""
+    def count(self, unknown: Mapping[str, int]) -> None:
+        """Count sentences of unknown types."""
+        for kind, count in unknown.items():
+            self._counts[kind] = self._counts.get(kind, 0) + count
+
+    def add(self, found: Sequence[Frame | tuple[int, float, Record]]) -> None:
+        """Read the next frames, or the records of the next plain lines."""
         for item in found:
             if len(item) == 3:
                 self._line, self._clock.receive, record = item
@@ -174,16 +182,14 @@ class _Reader:
         if not isinstance(record, Refused):
             self._heed(record)
         elif record.kind == "unknown-type":
-            self._heed(record.text)
+            self.count({record.text: 1})
         else:
             self._problem(record.kind, line, text)
 
-    def _heed(self, record: Record | str) -> None:
-        """Take a record in, or count the type of one that is not known."""
-        kind = record if isinstance(record, str) else record.type
+    def _heed(self, record: Record) -> None:
+        kind = record.type
         self._counts[kind] = self._counts.get(kind, 0) + 1
-        if not isinstance(record, str):
-            self._take[record.__class__](record)
+        self._take[record.__class__](record)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""
@@ -297,6 +303,6 @@ class _Reader:
         self._instant(record.second, record.day)
 
     def _samples_of(self, record: Record, **values: float) -> None:
-        time = self._clock.now()
+        time, sensor = self._clock.now(), record.talker + record.type
         for name, value in values.items():
-            self._sample(name, record.talker + record.type, time, value)
+            self._sample(name, sensor, time, value)
