@@ -20,6 +20,7 @@ from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Target, Velo
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
 if TYPE_CHECKING:
@@ -182,7 +183,7 @@ def clean(
     check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
-    with over_bytes(files, quiet=as_json) as told:
+    with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
             depth=depth,
@@ -220,7 +221,7 @@ def info(
     from surefix.pipelines.info import describe, info_lines
 
     files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
-    with over_bytes(files, quiet=as_json) as told:
+    with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
             depth=depth,
@@ -245,7 +246,8 @@ def demo(
     typer.echo("Simulating a dive with USBL, DVL and depth, and cleaning it …")
     from surefix.pipelines.demo import demonstrate
 
-    done = demonstrate(folder, seed)
+    with announced():
+        done = demonstrate(folder, seed)
     for line in done.lines:
         typer.echo(f"  {line}")
     for path in done.written:
@@ -273,7 +275,7 @@ def reproduce(
     check_report(report)
     check_place("--json", json_file)
     keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
-    with over_runs(runs) as told:
+    with announced(), over_runs(runs) as told:
         experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)
     tell(experiment, experiment, json_file, report)
 
@@ -281,6 +283,7 @@ def reproduce(
 app.command()(compare)
 app.command()(locate)
 app.command()(live)
+app.command()(warmup)
 
 
 def main() -> None:
