@@ -146,7 +146,7 @@ def test_stopped_by_a_signal_it_ends_in_order(tmp_path):
         stdout=subprocess.PIPE, text=True,
     ) as run:  # fmt: skip
         assert run.stdout is not None
-        assert run.stdout.readline() == "1 inputs, 1 outputs\n"
+        assert run.stdout.readline() == f"from udp://127.0.0.1:{port}\n"
         _send(port, recorded().splitlines(keepends=True), 0.001)
         time.sleep(1.0)
         began = time.monotonic()

@@ -161,6 +161,8 @@ def read_live(path: str | Path) -> LiveOptions:
     if given.setdefault("mode", "realtime") != "realtime":
         raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
     journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    if (url := journal.get("url")) is not None:
+        journal["url"] = _beside(place, str(url))
     return LiveOptions(
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
@@ -169,11 +171,17 @@ def read_live(path: str | Path) -> LiveOptions:
     )
 
 
+def _beside(place: Path, url: str) -> str:
+    """Let the path of a SQLite file begin at the folder of the options."""
+    kind, mark, path = url.partition(":///")
+    return f"{kind}{mark}{place.parent / path}" if kind == "sqlite" else url
+
+
 def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> dict[str, Any]:
     table = content.get(name, {})
     if not isinstance(table, dict) or set(table) - keys:
         raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
-    return table
+    return dict(table)
 
 
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:
