@@ -31,13 +31,14 @@ from typing import Any, Final
 from surefix.errors import OptionsError
 from surefix.io.options_file import read_options
 from surefix.io.toml_file import read_toml
+from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
 
 __all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
-SENTENCES: Final = ("GGA", "RMC", "VTG", "GST", "HDT", "DPT")
-"""What can be put out."""
+SENTENCES: Final = (*TYPES, "GBS")
+"""What can be put out; gpsd takes its expected errors from GBS."""
 
 _ROLES: Final = ("fixes", "depth", "heading")
 _TALKER: Final = re.compile(r"[A-Z]{2}")
