@@ -10,8 +10,9 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar, cast
 
 import numba
+from numba.extending import register_jitable
 
-__all__ = ["helper", "kernel"]
+__all__ = ["helper", "inner", "kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -28,3 +29,13 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
         Callable[P, T],
         numba.njit(cache=True, error_model="numpy", inline="never")(function),
     )
+
+
+def inner(function: Callable[P, T]) -> Callable[P, T]:
+    """Make a function part of the machine code of the kernels that call it.
+
+    It is compiled with them alone, for no way in from Python is made, where it stays as it is
+    written. A product and a sum may become one instruction.
+    """
+    part = register_jitable(error_model="numpy", forceinline=True, fastmath={"contract"})
+    return cast(Callable[P, T], part(function))
