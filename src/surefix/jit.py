@@ -37,5 +37,5 @@ def inner(function: Callable[P, T]) -> Callable[P, T]:
     It is compiled with them alone, for no way in from Python is made, where it stays as it is
     written. A product and a sum may become one instruction.
     """
-    part = register_jitable(error_model="numpy", forceinline=True, fastmath={"contract"})
+    part = register_jitable(error_model="numpy", forceinline=True, _nrt=False, fastmath={"contract"})
     return cast(Callable[P, T], part(function))

@@ -251,13 +251,13 @@ def position_branches(
     score: FloatArray,
     parent: IntArray,
     code: IntArray,
+    parts: FloatArray,
 ) -> int:
-    """Candidates of an observed position at ``time``."""
+    """Candidates of an observed position at ``time``; ``parts`` (4, 3) is scratch."""
     d, b = motion.axes, motion.order
-    close = np.zeros(3)  # ν²/S …
-    S = np.ones(3)  # … and S
-    wild = np.zeros(3)  # ν²/W …
-    wide = np.ones(3)  # … and the variance W of a wild fix
+    close, S = parts[0], parts[1]  # ν²/S, and S
+    wild, wide = parts[2], parts[3]  # ν²/W, and the variance W of a wild fix
+    parts[:, :] = 1.0
     total = 0
     observed = 0
     mask = 0

@@ -13,6 +13,7 @@ The output is the mean and the covariance of the mixture, so that doubt is part 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -191,6 +192,107 @@ def _judge(
     return best
 
 
+class _Scratch(NamedTuple):
+    """What a step writes before it reads it."""
+
+    score: FloatArray  # of each candidate, its parent and its code
+    parent: IntArray
+    code: IntArray
+    chosen: IntArray  # candidates, best first
+    origin: IntArray  # of each hypothesis, its place after the last epoch
+    said: IntArray  # … and its code
+    before: IntArray  # the same of the hypotheses that candidates come from
+    spoken: IntArray
+    claims: IntArray
+    spare: IntArray
+    row: IntArray
+    keep: BoolArray
+    r: FloatArray  # variances of the components
+    noise: FloatArray  # share of the position's own noise in its innovation
+    share: FloatArray  # probabilities
+    parts: FloatArray
+
+
+@inner
+def _step(
+    motion: Motion,
+    prior: Prior,
+    epochs: Epochs,
+    k: int,
+    bank: Bank,
+    place: IntArray,
+    work: _Scratch,
+    adapting: bool,
+    found: Found,
+    trail: Trail,
+) -> None:
+    """Epoch k: predict, weigh velocity and position, merge, report."""
+    d, r, said = motion.axes, work.r, work.said
+    time = epochs.time[k]
+    dt = 0.0 if math.isnan(bank.time[0]) else time - bank.time[0]
+    sensor = epochs.sensor[k] if len(epochs.sensor) else 0
+    z, forced = epochs.z[k], epochs.fixed[k]
+    found.scale[k] = bank.scale[sensor]
+    placed = moved = False
+    for a in range(d):
+        r[a] = epochs.variance[k, a] * bank.scale[sensor]
+        r[d + a] = epochs.variance[k, d + a]
+        placed = placed or not math.isnan(z[a])
+        moved = moved or not math.isnan(z[d + a])
+    if epochs.jump[k]:
+        _displace(motion, bank, place, epochs.jump[k])
+    for i in range(bank.number[0]):
+        work.origin[i], said[i] = i, 0
+        if dt > 0.0:
+            for a in range(d):
+                m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
+                predict_axis(m, P, motion.order, dt, motion.density[a])
+    innovate(motion, bank, place, k, z, r, found, work.noise)
+    for stage in range(2):
+        if stage == 0 and moved:
+            total = velocity_branches(
+                motion, prior, bank, place, z, r, forced, time, sensor,
+                work.score, work.parent, work.code,
+            )
+        elif stage == 1 and placed:
+            total = position_branches(
+                motion, prior, bank, place, z, r, forced, time, sensor,
+                work.score, work.parent, work.code, work.parts,
+            )
+        else:
+            continue
+        count, norm = keep_best(work.score, total, work.chosen, bank.weight)
+        found.evidence[k] += norm
+        for i in range(bank.number[0]):
+            work.before[i], work.spoken[i] = work.origin[i], said[i]
+        give_rows(
+            bank, place, work.parent, work.chosen, count, work.claims, work.spare, work.row
+        )
+        for i in range(count):
+            p, what = work.parent[work.chosen[i]], work.code[work.chosen[i]]
+            work.origin[i] = work.before[p]
+            said[i] = work.spoken[p] | what
+            if stage == 1:
+                speed = prior.sigma_velocity
+                apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
+            else:
+                _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
+    _commit_lasting(motion, prior, bank, place, time, said)
+    if bank.number[0] > 1:
+        _close_ranks(motion, bank, place, work.keep, work.origin, said)
+    fix = not math.isnan(z[0])
+    best = _judge(motion, prior, bank, place, k, said, fix, work.share, found)
+    if adapting:
+        adapt(motion, prior, bank, k, sensor, work.noise, found)
+    if len(trail.best):
+        trail.best[k] = best
+        for i in range(bank.number[0]):
+            trail.parent[k, i] = work.origin[i]
+            trail.code[k, i] = said[i]
+    report(motion, bank, place, work.share, said, best, k, found)
+    bank.time[0] = time
+
+
 @kernel
 def _run(
     motion: Motion,
@@ -206,83 +308,33 @@ def _run(
     The i-th hypothesis, best first, is in row ``place[i]`` of the bank, but for its weight, which
     is the i-th: what a hypothesis knows is moved only where several come from it.
     """
-    d = motion.axes
-    most, traced = bank.weight.shape[0], trail.best.shape[0] > 0
-    score = np.empty(most * BRANCHES)
-    parent = np.empty(most * BRANCHES, np.int64)
-    code = np.empty(most * BRANCHES, np.int64)
-    chosen = np.empty(most, np.int64)
-    origin, before = np.empty(most, np.int64), np.empty(most, np.int64)
-    said, spoken = np.empty(most, np.int64), np.empty(most, np.int64)
-    claims, spare, row = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
-    keep = np.empty(most, np.bool_)
-    r, noise, share = np.empty(2 * d), np.zeros(d), np.empty(most)
-    adapting = np.any(prior.adapt > 0.0)
-    speed = prior.sigma_velocity
-    time = bank.time[0]
-    if math.isnan(time):
+    d, most = motion.axes, bank.weight.shape[0]
+    work = _Scratch(
+        np.empty(most * BRANCHES),
+        np.empty(most * BRANCHES, np.int64),
+        np.empty(most * BRANCHES, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty(most, np.bool_),
+        np.empty(2 * d),
+        np.zeros(d),
+        np.empty(most),
+        np.empty((4, 3)),
+    )
+    if math.isnan(bank.time[0]):
+        speed = prior.sigma_velocity
         for a in range(d):
             for s in range(1, motion.order):
                 bank.covariance[place[0], a, s, s] = speed * speed
+    adapting = np.any(prior.adapt > 0.0)
     for k in range(len(epochs.time)):
-        dt = 0.0 if math.isnan(time) else epochs.time[k] - time
-        time = epochs.time[k]
-        sensor = epochs.sensor[k] if len(epochs.sensor) else 0
-        z, forced = epochs.z[k], epochs.fixed[k]
-        found.scale[k] = bank.scale[sensor]
-        placed = moved = False
-        for a in range(d):
-            r[a] = epochs.variance[k, a] * bank.scale[sensor]
-            r[d + a] = epochs.variance[k, d + a]
-            placed = placed or not math.isnan(z[a])
-            moved = moved or not math.isnan(z[d + a])
-        if epochs.jump[k]:
-            _displace(motion, bank, place, epochs.jump[k])
-        for i in range(bank.number[0]):
-            origin[i], said[i] = i, 0
-            if dt > 0.0:
-                for a in range(d):
-                    m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
-                    predict_axis(m, P, motion.order, dt, motion.density[a])
-        innovate(motion, bank, place, k, z, r, found, noise)
-        for stage in range(2):
-            if stage == 0 and moved:
-                total = velocity_branches(
-                    motion, prior, bank, place, z, r, forced, time, sensor, score, parent, code
-                )
-            elif stage == 1 and placed:
-                total = position_branches(
-                    motion, prior, bank, place, z, r, forced, time, sensor, score, parent, code
-                )
-            else:
-                continue
-            count, norm = keep_best(score, total, chosen, bank.weight)
-            found.evidence[k] += norm
-            for i in range(bank.number[0]):
-                before[i], spoken[i] = origin[i], said[i]
-            give_rows(bank, place, parent, chosen, count, claims, spare, row)
-            for i in range(count):
-                p, what = parent[chosen[i]], code[chosen[i]]
-                origin[i] = before[p]
-                said[i] = spoken[p] | what
-                if stage == 1:
-                    apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
-                else:
-                    _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
-        _commit_lasting(motion, prior, bank, place, time, said)
-        if bank.number[0] > 1:
-            _close_ranks(motion, bank, place, keep, origin, said)
-        fix = not math.isnan(z[0])
-        best = _judge(motion, prior, bank, place, k, said, fix, share, found)
-        if adapting:
-            adapt(motion, prior, bank, k, sensor, noise, found)
-        if traced:
-            trail.best[k] = best
-            for i in range(bank.number[0]):
-                trail.parent[k, i] = origin[i]
-                trail.code[k, i] = said[i]
-        report(motion, bank, place, share, said, best, k, found)
-    bank.time[0] = time
+        _step(motion, prior, epochs, k, bank, place, work, adapting, found, trail)
 
 
 def filter_hypotheses(
