@@ -243,21 +243,27 @@ def apply_position(
 
 
 @inner
-def merge(motion: Motion, bank: Bank, place: IntArray, keep: BoolArray) -> None:
-    """Let the lesser of two hypotheses that say the same add its weight to the greater."""
+def merge(
+    motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: FloatArray
+) -> None:
+    """Let the lesser of two hypotheses that say the same add its weight to the greater.
+
+    ``keep`` (k,) becomes which are left; ``key`` (k,) is scratch.
+    """
     count = bank.number[0]
     for i in range(count):
         keep[i] = True
+        key[i] = bank.mean[place[i], 0, 0]
     for first in range(count):
-        i = place[first]
         if not keep[first]:
             continue
+        limit = _ALIKE * bank.covariance[place[first], 0, 0, 0]
+        limit = limit if limit > 0.0 else np.inf
         for second in range(first + 1, count):
-            j = place[second]
-            gap = bank.mean[i, 0, 0] - bank.mean[j, 0, 0]
-            if gap * gap > _ALIKE * bank.covariance[i, 0, 0, 0] > 0.0:
+            gap = key[first] - key[second]
+            if gap * gap > limit or not keep[second]:
                 continue
-            if keep[second] and _alike(motion, bank, i, j):
+            if _alike(motion, bank, place[first], place[second]):
                 keep[second] = False
                 bank.weight[first] = log_sum(bank.weight[first], bank.weight[second])
 

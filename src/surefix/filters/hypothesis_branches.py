@@ -49,6 +49,7 @@ _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, t
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
 _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
 _ANEW = 0.1  # … and how probable that is then
+_ABSURD = 1e50  # squared errors whose fourth power is not far from overflow
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -71,6 +72,19 @@ def log_wild(square: float, log_scale: float, count: int) -> float:
     else:
         constant = -2.0 * math.log(_PI)
     return constant - log_scale - 0.5 * (count + 1) * math.log1p(square)
+
+
+@inner
+def _wild(square: float, volume: float, count: int) -> float:
+    """`log_wild` of a product of squared scales, with one logarithm where nothing overflows."""
+    if square > _ABSURD:
+        return log_wild(square, 0.5 * math.log(volume), count)
+    tail = 1.0 + square
+    if count == 1:
+        return -math.log(_PI) - 0.5 * math.log(volume * tail * tail)
+    if count == 2:
+        return -math.log(2.0 * _PI) - 0.5 * math.log(volume * tail * tail * tail)
+    return -2.0 * math.log(_PI) - 0.5 * math.log(volume * tail * tail * tail * tail)
 
 
 @inner
@@ -181,7 +195,7 @@ def velocity_branches(
             square += nu * nu / w
             wide *= w
             seen += 1
-        outside = log_wild(square, 0.5 * math.log(wide), seen)
+        outside = _wild(square, wide, seen)
         out = prior.velocity
         if (bank.faulty[k] >> sensor) & 1:
             out = prior.again
@@ -220,7 +234,7 @@ def _swift(
 
     Component 0 is the position, 1 the velocity; ``z`` and ``variance`` (axes,) are those of it.
     """
-    square, scale, longest = 0.0, 0.0, 0.0
+    square, volume, longest = 0.0, 1.0, 0.0
     seen = 0
     for a in range(motion.axes):
         if math.isnan(z[a]):
@@ -232,9 +246,9 @@ def _swift(
         longest = max(longest, gap)
         free = _freed(motion, a, c, gap, bank.covariance[k, a, c, c] + variance[a])
         square += nu * nu / free
-        scale += 0.5 * math.log(free)
+        volume *= free
         seen += 1
-    return log_wild(square, scale, seen) if longest > 0.0 else np.nan
+    return _wild(square, volume, seen) if longest > 0.0 else np.nan
 
 
 @inner
@@ -313,7 +327,7 @@ def position_branches(
             score[total] = base
             for a in range(d):
                 if (given >> a) & 1:
-                    score[total] += log_wild(wild[a], 0.5 * math.log(wide[a]), 1)
+                    score[total] += _wild(wild[a], wide[a], 1)
                 elif not math.isnan(z[a]):
                     score[total] -= 0.5 * (close[a] + math.log(S[a]) + _LOG_2PI)
             parent[total], code[total] = i, given
@@ -336,7 +350,7 @@ def position_branches(
                 code[total] |= DENY
         parent[total] = i
         total += 1
-        outside = base + log_wild(square, 0.5 * math.log(whole), observed)
+        outside = base + _wild(square, whole, observed)
         score[total] = outside + isolated
         parent[total], code[total] = i, mask
         total += 1
@@ -370,12 +384,11 @@ def position_branches(
                     if o != a and not math.isnan(z[o]):
                         rest += close[o]
                         product *= S[o]
-                alone = math.log(_PI * (1.0 + wild[a]) * math.sqrt(product))
-                score[total] = base + partial - 0.5 * rest - alone
+                score[total] = base + partial - 0.5 * rest + _wild(wild[a], product, 1)
                 parent[total], code[total] = i, 1 << a
                 total += 1
             if observed == 3:
-                both = log_wild(wild[0] + wild[1], 0.5 * math.log(wide[0] * wide[1] * S[2]), 2)
+                both = _wild(wild[0] + wild[1], wide[0] * wide[1] * S[2], 2)
                 score[total] = base + partial + both - 0.5 * (close[2] + _LOG_2PI)
                 parent[total], code[total] = i, 3
                 total += 1

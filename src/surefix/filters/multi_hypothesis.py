@@ -65,6 +65,27 @@ __all__ = ["filter_hypotheses"]
 _BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced"})
 
 
+class _Scratch(NamedTuple):
+    """What a step writes before it reads it."""
+
+    score: FloatArray  # of each candidate, its parent and its code
+    parent: IntArray
+    code: IntArray
+    chosen: IntArray  # candidates, best first
+    origin: IntArray  # of each hypothesis, its place after the last epoch
+    said: IntArray  # … and its code
+    before: IntArray  # the same of the hypotheses that candidates come from
+    spoken: IntArray
+    claims: IntArray
+    spare: IntArray
+    row: IntArray
+    keep: BoolArray
+    r: FloatArray  # variances of the components
+    noise: FloatArray  # share of the position's own noise in its innovation
+    share: FloatArray  # probabilities
+    parts: FloatArray
+
+
 @inner
 def _apply_velocity(
     motion: Motion,
@@ -132,10 +153,11 @@ def _commit_lasting(
 
 @inner
 def _close_ranks(
-    motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, origin: IntArray, said: IntArray
+    motion: Motion, bank: Bank, place: IntArray, work: _Scratch, origin: IntArray, said: IntArray
 ) -> None:
     """Merge what is alike and close the gaps."""
-    merge(motion, bank, place, keep)
+    keep = work.keep
+    merge(motion, bank, place, keep, work.share)
     left = 0
     for i in range(bank.number[0]):
         if not keep[i]:
@@ -190,27 +212,6 @@ def _judge(
         if not began <= bank.announced[0]:
             bank.announced[0] = began
     return best
-
-
-class _Scratch(NamedTuple):
-    """What a step writes before it reads it."""
-
-    score: FloatArray  # of each candidate, its parent and its code
-    parent: IntArray
-    code: IntArray
-    chosen: IntArray  # candidates, best first
-    origin: IntArray  # of each hypothesis, its place after the last epoch
-    said: IntArray  # … and its code
-    before: IntArray  # the same of the hypotheses that candidates come from
-    spoken: IntArray
-    claims: IntArray
-    spare: IntArray
-    row: IntArray
-    keep: BoolArray
-    r: FloatArray  # variances of the components
-    noise: FloatArray  # share of the position's own noise in its innovation
-    share: FloatArray  # probabilities
-    parts: FloatArray
 
 
 @inner
@@ -279,7 +280,7 @@ def _step(
                 _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
     _commit_lasting(motion, prior, bank, place, time, said)
     if bank.number[0] > 1:
-        _close_ranks(motion, bank, place, work.keep, work.origin, said)
+        _close_ranks(motion, bank, place, work, work.origin, said)
     fix = not math.isnan(z[0])
     best = _judge(motion, prior, bank, place, k, said, fix, work.share, found)
     if adapting:
@@ -319,8 +320,8 @@ def _run(
         np.empty(most, np.int64),
         np.empty(most, np.int64),
         np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
+        np.empty(most, np.uint64),
+        np.empty(most, np.uint64),
         np.empty(most, np.bool_),
         np.empty(2 * d),
         np.zeros(d),
@@ -361,7 +362,8 @@ def filter_hypotheses(
         The hypotheses after the series, what their mixture says, and how they came about.
     """
     n, most = len(epochs.time), len(bank.weight)
-    after, place = Bank._make(field.copy() for field in bank), np.arange(most)
+    after = Bank._make(field.copy() for field in bank)
+    place = np.arange(most, dtype=np.uint64)
     found = _blank(motion, n)
     rows = n if traced else 0
     trail = Trail(
