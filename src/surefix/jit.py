@@ -12,7 +12,7 @@ from typing import ParamSpec, TypeVar, cast
 import numba
 from numba.extending import register_jitable
 
-__all__ = ["helper", "inner", "kernel"]
+__all__ = ["helper", "inner", "kernel", "lean_kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -31,11 +31,21 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
     )
 
 
+def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel that allocates nothing: references to arrays are not counted in it.
+
+    Counting them, an atomic operation for each slice, costs a small kernel more than its work.
+    """
+    flags = {"_nrt": False, "fastmath": {"contract"}}
+    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", **flags)(function))
+
+
 def inner(function: Callable[P, T]) -> Callable[P, T]:
-    """Make a function part of the machine code of the kernels that call it.
+    """Make a function that allocates nothing part of the machine code of the kernels that call it.
 
     It is compiled with them alone, for no way in from Python is made, where it stays as it is
     written. A product and a sum may become one instruction.
     """
-    part = register_jitable(error_model="numpy", forceinline=True, _nrt=False, fastmath={"contract"})
+    flags = {"_nrt": False, "no_cfunc_wrapper": True, "fastmath": {"contract"}}
+    part = register_jitable(error_model="numpy", forceinline=True, **flags)
     return cast(Callable[P, T], part(function))

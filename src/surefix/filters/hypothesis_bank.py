@@ -231,15 +231,14 @@ def apply_position(
             rate = abs(nu) / reach(motion.order, 0, gap)
             rate = max(agility(motion.density[a], gap), HASTE * rate)
             change_rate(P, motion.order, gap, rate)
-        if code & POOR:
-            update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
-        elif code & OPEN:
+        if code & OPEN:
             open_run(m, P, n, nu, variance[a])
-        elif code & CONTINUE:
+            continue
+        shifted = code & CONTINUE != 0
+        if shifted:
             nu = wrapped(nu - m[b], motion.period)
-            update_axis(m, P, n, 0, True, nu, variance[a])
-        else:
-            update_axis(m, P, n, 0, False, nu, variance[a])
+        r = variance[a] / POOR_WEIGHT if code & POOR else variance[a]
+        update_axis(m, P, n, 0, shifted, nu, r)
 
 
 @inner

@@ -49,7 +49,7 @@ _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, t
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
 _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
 _ANEW = 0.1  # … and how probable that is then
-_ABSURD = 1e50  # squared errors whose fourth power is not far from overflow
+_ABSURD = 1e50  # squared errors beyond it are no less likely: its fourth power is a number
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -76,15 +76,17 @@ def log_wild(square: float, log_scale: float, count: int) -> float:
 
 @inner
 def _wild(square: float, volume: float, count: int) -> float:
-    """`log_wild` of a product of squared scales, with one logarithm where nothing overflows."""
-    if square > _ABSURD:
-        return log_wild(square, 0.5 * math.log(volume), count)
-    tail = 1.0 + square
-    if count == 1:
-        return -math.log(_PI) - 0.5 * math.log(volume * tail * tail)
-    if count == 2:
-        return -math.log(2.0 * _PI) - 0.5 * math.log(volume * tail * tail * tail)
-    return -2.0 * math.log(_PI) - 0.5 * math.log(volume * tail * tail * tail * tail)
+    """`log_wild` with the product of the squared scales, and with one logarithm."""
+    tail = 1.0 + min(square, _ABSURD)
+    power = tail * tail
+    if count > 1:
+        power *= tail
+    if count > 2:
+        power *= tail
+    constant = -2.0 * math.log(_PI)
+    if count < 3:
+        constant = -math.log(_PI) if count == 1 else -math.log(2.0 * _PI)
+    return constant - 0.5 * math.log(volume * power)
 
 
 @inner

@@ -57,7 +57,7 @@ from surefix.filters.hypothesis_branches import (
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track_predict import VAGUE_RATE
-from surefix.jit import inner, kernel
+from surefix.jit import inner, lean_kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
@@ -214,12 +214,11 @@ def _judge(
     return best
 
 
-@inner
-def _step(
+@lean_kernel
+def _run(
     motion: Motion,
     prior: Prior,
     epochs: Epochs,
-    k: int,
     bank: Bank,
     place: IntArray,
     work: _Scratch,
@@ -227,115 +226,80 @@ def _step(
     found: Found,
     trail: Trail,
 ) -> None:
-    """Epoch k: predict, weigh velocity and position, merge, report."""
-    d, r, said = motion.axes, work.r, work.said
-    time = epochs.time[k]
-    dt = 0.0 if math.isnan(bank.time[0]) else time - bank.time[0]
-    sensor = epochs.sensor[k] if len(epochs.sensor) else 0
-    z, forced = epochs.z[k], epochs.fixed[k]
-    found.scale[k] = bank.scale[sensor]
-    placed = moved = False
-    for a in range(d):
-        r[a] = epochs.variance[k, a] * bank.scale[sensor]
-        r[d + a] = epochs.variance[k, d + a]
-        placed = placed or not math.isnan(z[a])
-        moved = moved or not math.isnan(z[d + a])
-    if epochs.jump[k]:
-        _displace(motion, bank, place, epochs.jump[k])
-    for i in range(bank.number[0]):
-        work.origin[i], said[i] = i, 0
-        if dt > 0.0:
-            for a in range(d):
-                m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
-                predict_axis(m, P, motion.order, dt, motion.density[a])
-    innovate(motion, bank, place, k, z, r, found, work.noise)
-    for stage in range(2):
-        if stage == 0 and moved:
-            total = velocity_branches(
-                motion, prior, bank, place, z, r, forced, time, sensor,
-                work.score, work.parent, work.code,
-            )
-        elif stage == 1 and placed:
-            total = position_branches(
-                motion, prior, bank, place, z, r, forced, time, sensor,
-                work.score, work.parent, work.code, work.parts,
-            )
-        else:
-            continue
-        count, norm = keep_best(work.score, total, work.chosen, bank.weight)
-        found.evidence[k] += norm
-        for i in range(bank.number[0]):
-            work.before[i], work.spoken[i] = work.origin[i], said[i]
-        give_rows(
-            bank, place, work.parent, work.chosen, count, work.claims, work.spare, work.row
-        )
-        for i in range(count):
-            p, what = work.parent[work.chosen[i]], work.code[work.chosen[i]]
-            work.origin[i] = work.before[p]
-            said[i] = work.spoken[p] | what
-            if stage == 1:
-                speed = prior.sigma_velocity
-                apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
-            else:
-                _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
-    _commit_lasting(motion, prior, bank, place, time, said)
-    if bank.number[0] > 1:
-        _close_ranks(motion, bank, place, work, work.origin, said)
-    fix = not math.isnan(z[0])
-    best = _judge(motion, prior, bank, place, k, said, fix, work.share, found)
-    if adapting:
-        adapt(motion, prior, bank, k, sensor, work.noise, found)
-    if len(trail.best):
-        trail.best[k] = best
-        for i in range(bank.number[0]):
-            trail.parent[k, i] = work.origin[i]
-            trail.code[k, i] = said[i]
-    report(motion, bank, place, work.share, said, best, k, found)
-    bank.time[0] = time
-
-
-@kernel
-def _run(
-    motion: Motion,
-    prior: Prior,
-    epochs: Epochs,
-    bank: Bank,
-    place: IntArray,
-    found: Found,
-    trail: Trail,
-) -> None:
-    """Loop of `filter_hypotheses`.
+    """Loop of `filter_hypotheses`: predict, weigh velocity and position, merge, report.
 
     The i-th hypothesis, best first, is in row ``place[i]`` of the bank, but for its weight, which
     is the i-th: what a hypothesis knows is moved only where several come from it.
     """
-    d, most = motion.axes, bank.weight.shape[0]
-    work = _Scratch(
-        np.empty(most * BRANCHES),
-        np.empty(most * BRANCHES, np.int64),
-        np.empty(most * BRANCHES, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.int64),
-        np.empty(most, np.uint64),
-        np.empty(most, np.uint64),
-        np.empty(most, np.bool_),
-        np.empty(2 * d),
-        np.zeros(d),
-        np.empty(most),
-        np.empty((4, 3)),
-    )
+    d, r, said = motion.axes, work.r, work.said
+    speed = prior.sigma_velocity
     if math.isnan(bank.time[0]):
-        speed = prior.sigma_velocity
         for a in range(d):
             for s in range(1, motion.order):
                 bank.covariance[place[0], a, s, s] = speed * speed
-    adapting = np.any(prior.adapt > 0.0)
     for k in range(len(epochs.time)):
-        _step(motion, prior, epochs, k, bank, place, work, adapting, found, trail)
+        time = epochs.time[k]
+        dt = 0.0 if math.isnan(bank.time[0]) else time - bank.time[0]
+        sensor = epochs.sensor[k] if len(epochs.sensor) else 0
+        z, forced = epochs.z[k], epochs.fixed[k]
+        found.scale[k] = bank.scale[sensor]
+        placed = moved = False
+        for a in range(d):
+            r[a] = epochs.variance[k, a] * bank.scale[sensor]
+            r[d + a] = epochs.variance[k, d + a]
+            placed = placed or not math.isnan(z[a])
+            moved = moved or not math.isnan(z[d + a])
+        if epochs.jump[k]:
+            _displace(motion, bank, place, epochs.jump[k])
+        for i in range(bank.number[0]):
+            work.origin[i], said[i] = i, 0
+            if dt > 0.0:
+                for a in range(d):
+                    m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
+                    predict_axis(m, P, motion.order, dt, motion.density[a])
+        innovate(motion, bank, place, k, z, r, found, work.noise)
+        for stage in range(2):
+            if stage == 0 and moved:
+                total = velocity_branches(
+                    motion, prior, bank, place, z, r, forced, time, sensor,
+                    work.score, work.parent, work.code,
+                )
+            elif stage == 1 and placed:
+                total = position_branches(
+                    motion, prior, bank, place, z, r, forced, time, sensor,
+                    work.score, work.parent, work.code, work.parts,
+                )
+            else:
+                continue
+            count, norm = keep_best(work.score, total, work.chosen, bank.weight)
+            found.evidence[k] += norm
+            for i in range(bank.number[0]):
+                work.before[i], work.spoken[i] = work.origin[i], said[i]
+            give_rows(
+                bank, place, work.parent, work.chosen, count, work.claims, work.spare, work.row
+            )
+            for i in range(count):
+                p, what = work.parent[work.chosen[i]], work.code[work.chosen[i]]
+                work.origin[i] = work.before[p]
+                said[i] = work.spoken[p] | what
+                if stage == 1:
+                        apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
+                else:
+                    _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
+        _commit_lasting(motion, prior, bank, place, time, said)
+        if bank.number[0] > 1:
+            _close_ranks(motion, bank, place, work, work.origin, said)
+        fix = not math.isnan(z[0])
+        best = _judge(motion, prior, bank, place, k, said, fix, work.share, found)
+        if adapting:
+            adapt(motion, prior, bank, k, sensor, work.noise, found)
+        if len(trail.best):
+            trail.best[k] = best
+            for i in range(bank.number[0]):
+                trail.parent[k, i] = work.origin[i]
+                trail.code[k, i] = said[i]
+        report(motion, bank, place, work.share, said, best, k, found)
+        bank.time[0] = time
 
 
 def filter_hypotheses(
@@ -369,9 +333,26 @@ def filter_hypotheses(
     trail = Trail(
         np.zeros((rows, most), np.int8), np.zeros((rows, most), np.uint16), np.zeros(rows, np.int8)
     )
-    _run(motion, prior, epochs, after, place, found, trail)
+    adapting = bool(np.any(prior.adapt > 0.0))
+    work = _scratch(motion.axes, most)
+    _run(motion, prior, epochs, after, place, work, adapting, found, trail)
     moved = {name: getattr(after, name)[place] for name in _BY_ROW}
     return after._replace(**moved), found, trail
+
+
+def _scratch(axes: int, most: int) -> _Scratch:
+    return _Scratch(
+        np.empty(most * BRANCHES),
+        np.empty(most * BRANCHES, np.int64),
+        np.empty(most * BRANCHES, np.int64),
+        *(np.empty(most, np.int64) for _ in range(6)),
+        *(np.empty(most, np.uint64) for _ in range(2)),
+        np.empty(most, np.bool_),
+        np.empty(2 * axes),
+        np.zeros(axes),
+        np.empty(most),
+        np.empty((4, 3)),
+    )
 
 
 def _blank(motion: Motion, n: int) -> Found:
