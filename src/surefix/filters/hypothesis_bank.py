@@ -242,9 +242,7 @@ def apply_position(
 
 
 @inner
-def merge(
-    motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: FloatArray
-) -> None:
+def merge(motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: FloatArray) -> None:
     """Let the lesser of two hypotheses that say the same add its weight to the greater.
 
     ``keep`` (k,) becomes which are left; ``key`` (k,) is scratch.

@@ -290,7 +290,11 @@ def position_branches(
     staying = math.log(1.0 - prior.isolated - prior.partial - prior.burst)
     turned = math.log(prior.manoeuvre) if prior.manoeuvre > 0.0 else -np.inf
     lasting = math.log(1.0 - prior.isolated - prior.ending)
-    ending, isolated, burst = math.log(prior.ending), math.log(prior.isolated), math.log(prior.burst)
+    ending, isolated, burst = (
+        math.log(prior.ending),
+        math.log(prior.isolated),
+        math.log(prior.burst),
+    )
     partial = math.log(prior.partial / (observed + 1))
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]

@@ -261,13 +261,34 @@ def _run(
         for stage in range(2):
             if stage == 0 and moved:
                 total = velocity_branches(
-                    motion, prior, bank, place, z, r, forced, time, sensor,
-                    work.score, work.parent, work.code,
+                    motion,
+                    prior,
+                    bank,
+                    place,
+                    z,
+                    r,
+                    forced,
+                    time,
+                    sensor,
+                    work.score,
+                    work.parent,
+                    work.code,
                 )
             elif stage == 1 and placed:
                 total = position_branches(
-                    motion, prior, bank, place, z, r, forced, time, sensor,
-                    work.score, work.parent, work.code, work.parts,
+                    motion,
+                    prior,
+                    bank,
+                    place,
+                    z,
+                    r,
+                    forced,
+                    time,
+                    sensor,
+                    work.score,
+                    work.parent,
+                    work.code,
+                    work.parts,
                 )
             else:
                 continue
@@ -283,7 +304,7 @@ def _run(
                 work.origin[i] = work.before[p]
                 said[i] = work.spoken[p] | what
                 if stage == 1:
-                        apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
+                    apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
                 else:
                     _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
         _commit_lasting(motion, prior, bank, place, time, said)
