@@ -6,16 +6,22 @@ machine code on disk. With ``NUMBA_DISABLE_JIT=1`` the same source runs uncompil
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from collections.abc import Callable, Mapping
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 from numba.extending import register_jitable
 
-__all__ = ["helper", "inner", "kernel", "lean_kernel"]
+__all__ = ["helper", "inner", "kernel", "lean_helper", "lean_kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+_LEAN: Final[Mapping[str, Any]] = {
+    "_nrt": False,
+    "no_cfunc_wrapper": True,
+    "fastmath": {"contract"},
+}
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
@@ -34,18 +40,24 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
 def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that allocates nothing: references to arrays are not counted in it.
 
-    Counting them, an atomic operation for each slice, costs a small kernel more than its work.
+    Counting them, an atomic operation for each slice, costs a small kernel more than its work. A
+    product and a sum may become one instruction.
     """
-    flags = {"_nrt": False, "fastmath": {"contract"}}
-    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", **flags)(function))
+    lean = numba.njit(cache=True, error_model="numpy", **_LEAN)
+    return cast(Callable[P, T], lean(function))
+
+
+def lean_helper(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function that allocates nothing and that only kernels call.
+
+    No way in from Python is made, where it stays as it is written.
+    """
+    return register_jitable(error_model="numpy", **_LEAN)(function)
 
 
 def inner(function: Callable[P, T]) -> Callable[P, T]:
-    """Make a function that allocates nothing part of the machine code of the kernels that call it.
+    """Make such a function part of the machine code of the kernels that call it.
 
-    It is compiled with them alone, for no way in from Python is made, where it stays as it is
-    written. A product and a sum may become one instruction.
+    That is for what is called often or from one place: it is compiled at every place anew.
     """
-    flags = {"_nrt": False, "no_cfunc_wrapper": True, "fastmath": {"contract"}}
-    part = register_jitable(error_model="numpy", forceinline=True, **flags)
-    return cast(Callable[P, T], part(function))
+    return register_jitable(error_model="numpy", forceinline=True, **_LEAN)(function)

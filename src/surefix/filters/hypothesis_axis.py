@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from surefix.jit import inner
+from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray
 
 __all__ = [
@@ -127,7 +127,7 @@ def update_axis(
         P[3, 0], P[3, 1], P[3, 2] = P[0, 3], P[1, 3], P[2, 3]
 
 
-@inner
+@lean_helper
 def reach(order: int, c: int, gap: float) -> float:
     """How far component c is moved in ``gap`` seconds by a unit of the highest rate."""
     if c == order - 1:
@@ -135,13 +135,13 @@ def reach(order: int, c: int, gap: float) -> float:
     return gap if c == order - 2 else 0.5 * gap * gap
 
 
-@inner
+@lean_helper
 def agility(q: float, gap: float) -> float:
     """Scale of a change of the highest rate: a gross error of what is usual in ``gap`` seconds."""
     return _SWIFT * math.sqrt(q * gap)
 
 
-@inner
+@lean_helper
 def change_rate(P: FloatArray, order: int, gap: float, sigma: float) -> None:
     """Let the highest rate have changed at once by 0 ± ``sigma``, ``gap`` seconds ago."""
     for i in range(order):
@@ -149,7 +149,7 @@ def change_rate(P: FloatArray, order: int, gap: float, sigma: float) -> None:
             P[i, j] += reach(order, i, gap) * reach(order, j, gap) * sigma * sigma
 
 
-@inner
+@lean_helper
 def begin_anew(m: FloatArray, P: FloatArray, n: int, speed: float) -> None:
     """Forget how fast the vehicle goes: its rates are 0 ± ``speed``, and where it is stays."""
     for i in range(n):
@@ -162,7 +162,7 @@ def begin_anew(m: FloatArray, P: FloatArray, n: int, speed: float) -> None:
             m[i] = 0.0
 
 
-@inner
+@lean_helper
 def open_run(m: FloatArray, P: FloatArray, n: int, nu: float, r: float) -> None:
     """Begin a run: nothing was known of b, so it is the innovation and the track is not changed."""
     b = n - 1
@@ -173,7 +173,7 @@ def open_run(m: FloatArray, P: FloatArray, n: int, nu: float, r: float) -> None:
     P[b, b] = P[0, 0] + r
 
 
-@inner
+@lean_helper
 def forget(m: FloatArray, P: FloatArray, n: int) -> None:
     """End a run: b is dropped."""
     b = n - 1
@@ -183,7 +183,7 @@ def forget(m: FloatArray, P: FloatArray, n: int) -> None:
         P[j, b] = 0.0
 
 
-@inner
+@lean_helper
 def commit(m: FloatArray, P: FloatArray, n: int) -> None:
     """Take the offset for a true jump: ``p += b``."""
     b = n - 1

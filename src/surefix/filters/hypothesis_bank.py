@@ -31,9 +31,9 @@ from surefix.filters.hypothesis_axis import (
     reach,
     update_axis,
 )
-from surefix.filters.hypothesis_branches import log_sum, wrapped
+from surefix.filters.hypothesis_density import log_sum, wrapped
 from surefix.filters.records import Motion
-from surefix.jit import inner
+from surefix.jit import inner, lean_helper
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["apply_position", "best_of", "give_rows", "keep_best", "merge", "report"]
@@ -136,7 +136,7 @@ def keep_best(
     top = -np.inf
     for i in range(total):
         top = max(top, score[i])
-    norm, kept = 0.0, 0.0
+    norm = kept = 0.0
     count = 0
     for i in range(total):
         gap = score[i] - top
@@ -265,7 +265,7 @@ def merge(motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: Flo
                 bank.weight[first] = log_sum(bank.weight[first], bank.weight[second])
 
 
-@inner
+@lean_helper
 def _alike(motion: Motion, bank: Bank, i: int, j: int) -> bool:
     """Whether rows i and j of the bank say the same of the present and of the runs."""
     if bank.run[i] != bank.run[j] or bank.faulty[i] != bank.faulty[j]:

@@ -22,19 +22,23 @@ from surefix.filters.hypotheses import (
     Prior,
 )
 from surefix.filters.hypothesis_axis import agility, reach
+from surefix.filters.hypothesis_density import (
+    first_fix,
+    log_normal,
+    log_sum,
+    usual_or_poor,
+    wild_product,
+    wrapped,
+)
 from surefix.filters.records import Motion
-from surefix.jit import inner
+from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
 
 __all__ = [
     "BRANCHES",
     "CONFIRMED",
-    "log_normal",
-    "log_sum",
-    "log_wild",
     "position_branches",
     "velocity_branches",
-    "wrapped",
 ]
 
 BRANCHES = 14
@@ -49,56 +53,8 @@ _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, t
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
 _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
 _ANEW = 0.1  # … and how probable that is then
-_ABSURD = 1e50  # squared errors beyond it are no less likely: its fourth power is a number
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
-
-
-@inner
-def log_wild(square: float, log_scale: float, count: int) -> float:
-    """Log-density of a gross error: Cauchy in ``count`` dimensions, so that no size is impossible.
-
-    Parameters
-    ----------
-    square
-        Sum of squares of the errors over their scales.
-    log_scale
-        Sum of the logarithms of the scales.
-    """
-    if count == 1:
-        constant = -math.log(_PI)
-    elif count == 2:
-        constant = -math.log(2.0 * _PI)
-    else:
-        constant = -2.0 * math.log(_PI)
-    return constant - log_scale - 0.5 * (count + 1) * math.log1p(square)
-
-
-@inner
-def _wild(square: float, volume: float, count: int) -> float:
-    """`log_wild` with the product of the squared scales, and with one logarithm."""
-    tail = 1.0 + min(square, _ABSURD)
-    power = tail * tail
-    if count > 1:
-        power *= tail
-    if count > 2:
-        power *= tail
-    constant = -2.0 * math.log(_PI)
-    if count < 3:
-        constant = -math.log(_PI) if count == 1 else -math.log(2.0 * _PI)
-    return constant - 0.5 * math.log(volume * power)
-
-
-@inner
-def wrapped(nu: float, period: float) -> float:
-    """Innovation of an angle, within half a turn; unchanged if ``period`` is 0."""
-    return nu - period * np.rint(nu / period) if period > 0.0 else nu
-
-
-@inner
-def log_normal(nu: float, S: float) -> float:
-    """Log-density of an innovation ν of variance S."""
-    return -0.5 * (nu * nu / S + math.log(S) + _LOG_2PI)
 
 
 @inner
@@ -108,53 +64,10 @@ def _since(touched: float, time: float) -> float:
 
 
 @inner
-def _anywhere(square: float) -> float:
-    """Variance under which a normal density is at its middle that of a first fix.
-
-    That is the density of a gross error of the usual size, ``square`` its scale squared.
-    """
-    return 2.0 * _PI * square
-
-
-@inner
 def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
     """Scale, squared, of component c of axis a if the highest rate changed ``gap`` seconds ago."""
     change = agility(motion.density[a], gap) * reach(motion.order, c, gap)
     return change * change + S
-
-
-@inner
-def log_sum(a: float, b: float) -> float:
-    """Logarithm of the sum of two exponentials."""
-    return max(a, b) + math.log1p(math.exp(-abs(a - b)))
-
-
-@inner
-def _usual_or_poor(
-    distance: float, volume: float, near: float, wider: float, count: int, poor: float
-) -> tuple[float, bool]:
-    """Log-density of ``count`` components of which it is open whether they are poor.
-
-    ``log((1 − π) N(ν; S) + π N(ν; S + 3R))`` with one logarithm.
-
-    Parameters
-    ----------
-    distance, volume
-        Sum of ν²/S and product of S.
-    near, wider
-        The same with S + 3R.
-    poor
-        π.
-
-    Returns
-    -------
-    density, poorer
-        And whether poor is the likelier.
-    """
-    root = math.sqrt(volume)
-    usual = (1.0 - poor) * math.exp(0.5 * (near - distance))
-    noisy = poor * root / math.sqrt(wider)
-    return math.log((usual + noisy) / root) - 0.5 * (near + count * _LOG_2PI), noisy > usual
 
 
 @inner
@@ -178,9 +91,8 @@ def velocity_branches(
     turned = math.log(prior.manoeuvre) if prior.manoeuvre > 0.0 else -np.inf
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
-        distance, volume = 0.0, 1.0
-        near, wider = 0.0, 1.0
-        square, wide = 0.0, 1.0
+        distance = near = square = 0.0
+        volume = wider = wide = 1.0
         seen = 0
         for a in range(d):
             c = d + a
@@ -197,7 +109,7 @@ def velocity_branches(
             square += nu * nu / w
             wide *= w
             seen += 1
-        outside = _wild(square, wide, seen)
+        outside = wild_product(square, wide, seen)
         out = prior.velocity
         if (bank.faulty[k] >> sensor) & 1:
             out = prior.again
@@ -209,7 +121,7 @@ def velocity_branches(
                     alike += log_normal(change, bank.covariance[k, a, 1, 1] + 2.0 * variance[c])
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
-            inside, poorer = _usual_or_poor(distance, volume, near, wider, seen, prior.poor)
+            inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
             score[total] = base + inside + math.log1p(-out)
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
@@ -228,7 +140,7 @@ def velocity_branches(
     return total
 
 
-@inner
+@lean_helper
 def _swift(
     motion: Motion, bank: Bank, k: int, c: int, z: FloatArray, variance: FloatArray, time: float
 ) -> float:
@@ -236,7 +148,8 @@ def _swift(
 
     Component 0 is the position, 1 the velocity; ``z`` and ``variance`` (axes,) are those of it.
     """
-    square, volume, longest = 0.0, 1.0, 0.0
+    square = longest = 0.0
+    volume = 1.0
     seen = 0
     for a in range(motion.axes):
         if math.isnan(z[a]):
@@ -250,7 +163,7 @@ def _swift(
         square += nu * nu / free
         volume *= free
         seen += 1
-    return _wild(square, volume, seen) if longest > 0.0 else np.nan
+    return wild_product(square, volume, seen) if longest > 0.0 else np.nan
 
 
 @inner
@@ -299,18 +212,18 @@ def position_branches(
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
         running, own = bank.run[k] >= 0, bank.run[k] == sensor
-        distance, volume = 0.0, 1.0
-        near, wider = 0.0, 1.0
-        square, whole = 0.0, 1.0
-        offset = 0.0
+        distance = near = square = offset = 0.0
+        volume = wider = whole = 1.0
         unknown = due = False
         for a in range(d):
             if math.isnan(z[a]):
                 continue
             s2 = prior.spread[a] * prior.spread[a]
             if not bank.seen[k, a]:
-                wild[a], wide[a] = 1.0, s2 + variance[a]
-                close[a], S[a] = 0.0, _anywhere(wide[a])
+                wide[a] = s2 + variance[a]
+                wild[a] = 1.0
+                close[a] = 0.0
+                S[a] = first_fix(wide[a])
                 unknown = True
             else:
                 nu = wrapped(z[a] - bank.mean[k, a, 0], motion.period)
@@ -333,7 +246,7 @@ def position_branches(
             score[total] = base
             for a in range(d):
                 if (given >> a) & 1:
-                    score[total] += _wild(wild[a], wide[a], 1)
+                    score[total] += wild_product(wild[a], wide[a], 1)
                 elif not math.isnan(z[a]):
                     score[total] -= 0.5 * (close[a] + math.log(S[a]) + _LOG_2PI)
             parent[total], code[total] = i, given
@@ -349,14 +262,14 @@ def position_branches(
             score[total] = base + belongs + staying
             code[total] = 0
         else:
-            agrees, poor = _usual_or_poor(distance, volume, near, wider, observed, prior.poor)
+            agrees, poor = usual_or_poor(distance, volume, near, wider, observed, prior.poor)
             score[total] = base + agrees + staying
             code[total] = POOR if poor else 0
             if running and belongs - offset > _PREFERS:
                 code[total] |= DENY
         parent[total] = i
         total += 1
-        outside = base + _wild(square, whole, observed)
+        outside = base + wild_product(square, whole, observed)
         score[total] = outside + isolated
         parent[total], code[total] = i, mask
         total += 1
@@ -390,11 +303,11 @@ def position_branches(
                     if o != a and not math.isnan(z[o]):
                         rest += close[o]
                         product *= S[o]
-                score[total] = base + partial - 0.5 * rest + _wild(wild[a], product, 1)
+                score[total] = base + partial - 0.5 * rest + wild_product(wild[a], product, 1)
                 parent[total], code[total] = i, 1 << a
                 total += 1
             if observed == 3:
-                both = _wild(wild[0] + wild[1], wide[0] * wide[1] * S[2], 2)
+                both = wild_product(wild[0] + wild[1], wide[0] * wide[1] * S[2], 2)
                 score[total] = base + partial + both - 0.5 * (close[2] + _LOG_2PI)
                 parent[total], code[total] = i, 3
                 total += 1
@@ -407,7 +320,7 @@ def position_branches(
     return total
 
 
-@inner
+@lean_helper
 def _anew(
     prior: Prior,
     bank: Bank,
@@ -434,7 +347,7 @@ def _anew(
         patience = (_AIDED if aided else _PATIENCE) * prior.longest
         if due and time - bank.lost[k, a] >= patience:
             anew |= RESTART << a
-            free = _anywhere(prior.spread[a] * prior.spread[a] + variance[a])
+            free = first_fix(prior.spread[a] * prior.spread[a] + variance[a])
             fresh -= 0.5 * (math.log(free) + _LOG_2PI)
         else:
             every = False

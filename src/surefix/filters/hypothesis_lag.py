@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.filters.hypothesis_axis import change_rate, predict_axis, update_axis
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track_predict import VAGUE, VAGUE_RATE
-from surefix.jit import inner, lean_kernel
+from surefix.jit import lean_helper, lean_kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["Followed", "filter_decided", "not_followed", "smooth_windows"]
@@ -171,7 +171,7 @@ def _filter(
                     out.covariance[k, a, i, j] = P[i, j]
 
 
-@inner
+@lean_helper
 def _step_back(
     motion: Motion,
     time: FloatArray,
@@ -232,7 +232,7 @@ def _step_back(
     _congruence(G, Q, B, n, M, False)
 
 
-@inner
+@lean_helper
 def _divide(W: FloatArray, M: FloatArray, G: FloatArray, n: int, first: int) -> None:
     """Write ``G = W M⁻¹`` by ``M = L D Lᵀ`` over the states from ``first`` on; nought elsewhere."""
     for j in range(first, n):
@@ -254,7 +254,7 @@ def _divide(W: FloatArray, M: FloatArray, G: FloatArray, n: int, first: int) -> 
                 G[i, j] -= G[i, l] * M[l, j]
 
 
-@inner
+@lean_helper
 def _congruence(
     G: FloatArray, P: FloatArray, B: FloatArray, n: int, work: FloatArray, anew: bool
 ) -> None:
@@ -273,7 +273,7 @@ def _congruence(
             B[j, i] = total
 
 
-@inner
+@lean_helper
 def _chain(maps: _Map, to: int, one: int, two: int, n: int, work: FloatArray) -> None:
     """Write the map one after two, ``e = G₁ (G₂ e' + c₂) + c₁``, to a place of its own."""
     G, B, c = maps.G[to], maps.B[to], maps.c[to]
@@ -288,7 +288,7 @@ def _chain(maps: _Map, to: int, one: int, two: int, n: int, work: FloatArray) ->
     _congruence(maps.G[one], maps.B[two], B, n, work, False)
 
 
-@inner
+@lean_helper
 def _apply(maps: _Map, at: int, e: FloatArray, P: FloatArray, n: int, work: FloatArray) -> None:
     """Carry deviation and covariance through a map, in place; ``work`` (2, 3, 3) is scratch."""
     for i in range(n):

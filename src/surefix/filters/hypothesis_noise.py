@@ -8,9 +8,9 @@ import numpy as np
 
 from surefix.filters.hypotheses import Bank, Found, Prior
 from surefix.filters.hypothesis_bank import best_of
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.records import Motion
-from surefix.jit import inner
+from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["adapt", "innovate"]
@@ -54,7 +54,7 @@ def innovate(
         out.standardised[k, d + a] = nu / math.sqrt(S)
 
 
-@inner
+@lean_helper
 def adapt(
     motion: Motion,
     prior: Prior,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
-from surefix.filters.hypothesis_branches import log_normal, log_wild
+from surefix.filters.hypothesis_density import log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
 from surefix.jit import inner, kernel

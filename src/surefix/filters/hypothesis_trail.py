@@ -122,7 +122,7 @@ def decide(
     anew = np.full(motion.axes, -1)  # the fix of a restart …
     lost = np.full(motion.axes, -1)  # … and the earliest one left out before it
     for k in range(head, first - 1, -1):
-        code = trail.code[k, slot]
+        code = trail.code[trail.first[k] + slot]
         for a in range(motion.axes):
             if turned[a] >= 0 and _touched(motion, seen[k], code, a):
                 decisions.jump[turned[a]] |= 1 << motion.axes + a
@@ -161,7 +161,7 @@ def decide(
                 turned[a] = k
             if code & (RESTART << a):
                 anew[a] = lost[a] = k
-        slot = trail.parent[k, slot]
+        slot = trail.parent[trail.first[k] + slot]
     for a in range(motion.axes):
         if turned[a] >= 0:
             decisions.jump[turned[a]] |= 1 << motion.axes + a
@@ -187,8 +187,8 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
     n = len(trail.best)
     for k in range(head, n):
         best = trail.best[k]
-        code = trail.code[k, best]
-        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | MANOEUVRE | RESTARTS)):
+        code, parent = trail.code[trail.first[k] + best], trail.parent[trail.first[k] + best]
+        if k > 0 and (parent != slot or code & (COMMIT | MANOEUVRE | RESTARTS)):
             return k
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)

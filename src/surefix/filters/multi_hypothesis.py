@@ -13,7 +13,6 @@ The output is the mean and the covariance of the mixture, so that doubt is part 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -49,41 +48,20 @@ from surefix.filters.hypothesis_bank import (
     report,
 )
 from surefix.filters.hypothesis_branches import (
-    BRANCHES,
     CONFIRMED,
     position_branches,
     velocity_branches,
 )
 from surefix.filters.hypothesis_noise import adapt, innovate
+from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track_predict import VAGUE_RATE
-from surefix.jit import inner, lean_kernel
-from surefix.types import BoolArray, FloatArray, IntArray
+from surefix.jit import inner, lean_helper, lean_kernel
+from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
 _BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced"})
-
-
-class _Scratch(NamedTuple):
-    """What a step writes before it reads it."""
-
-    score: FloatArray  # of each candidate, its parent and its code
-    parent: IntArray
-    code: IntArray
-    chosen: IntArray  # candidates, best first
-    origin: IntArray  # of each hypothesis, its place after the last epoch
-    said: IntArray  # … and its code
-    before: IntArray  # the same of the hypotheses that candidates come from
-    spoken: IntArray
-    claims: IntArray
-    spare: IntArray
-    row: IntArray
-    keep: BoolArray
-    r: FloatArray  # variances of the components
-    noise: FloatArray  # share of the position's own noise in its innovation
-    share: FloatArray  # probabilities
-    parts: FloatArray
 
 
 @inner
@@ -121,7 +99,7 @@ def _apply_velocity(
     bank.moved[i] = time
 
 
-@inner
+@lean_helper
 def _displace(motion: Motion, bank: Bank, place: IntArray, jump: int) -> None:
     """Forget the positions, or the rates, that jump here by a decision made beforehand."""
     for i in place[: bank.number[0]]:
@@ -132,7 +110,7 @@ def _displace(motion: Motion, bank: Bank, place: IntArray, jump: int) -> None:
                 bank.seen[i, a] = False
 
 
-@inner
+@lean_helper
 def _commit_lasting(
     motion: Motion, prior: Prior, bank: Bank, place: IntArray, time: float, said: IntArray
 ) -> None:
@@ -153,7 +131,7 @@ def _commit_lasting(
 
 @inner
 def _close_ranks(
-    motion: Motion, bank: Bank, place: IntArray, work: _Scratch, origin: IntArray, said: IntArray
+    motion: Motion, bank: Bank, place: IntArray, work: Scratch, origin: IntArray, said: IntArray
 ) -> None:
     """Merge what is alike and close the gaps."""
     keep = work.keep
@@ -221,7 +199,7 @@ def _run(
     epochs: Epochs,
     bank: Bank,
     place: IntArray,
-    work: _Scratch,
+    work: Scratch,
     adapting: bool,
     found: Found,
     trail: Trail,
@@ -316,9 +294,11 @@ def _run(
             adapt(motion, prior, bank, k, sensor, work.noise, found)
         if len(trail.best):
             trail.best[k] = best
+            begin = trail.first[k]
             for i in range(bank.number[0]):
-                trail.parent[k, i] = work.origin[i]
-                trail.code[k, i] = said[i]
+                trail.parent[begin + i] = work.origin[i]
+                trail.code[begin + i] = said[i]
+            trail.first[k + 1] = begin + bank.number[0]
         report(motion, bank, place, work.share, said, best, k, found)
         bank.time[0] = time
 
@@ -348,32 +328,22 @@ def filter_hypotheses(
     """
     n, most = len(epochs.time), len(bank.weight)
     after = Bank._make(field.copy() for field in bank)
-    place = np.arange(most, dtype=np.uint64)
+    place = rows_of(most)
     found = _blank(motion, n)
     rows = n if traced else 0
-    trail = Trail(
-        np.zeros((rows, most), np.int8), np.zeros((rows, most), np.uint16), np.zeros(rows, np.int8)
+    trail = Trail(  # room for all, of which only what is written takes memory
+        np.empty(rows * most, np.uint8),
+        np.empty(rows * most, np.uint16),
+        np.zeros(rows + 1, np.int64),
+        np.zeros(rows, np.uint8),
     )
     adapting = bool(np.any(prior.adapt > 0.0))
-    work = _scratch(motion.axes, most)
+    work = scratch_for(motion.axes, most)
     _run(motion, prior, epochs, after, place, work, adapting, found, trail)
     moved = {name: getattr(after, name)[place] for name in _BY_ROW}
+    end = trail.first[-1]
+    trail = trail._replace(parent=trail.parent[:end], code=trail.code[:end])
     return after._replace(**moved), found, trail
-
-
-def _scratch(axes: int, most: int) -> _Scratch:
-    return _Scratch(
-        np.empty(most * BRANCHES),
-        np.empty(most * BRANCHES, np.int64),
-        np.empty(most * BRANCHES, np.int64),
-        *(np.empty(most, np.int64) for _ in range(6)),
-        *(np.empty(most, np.uint64) for _ in range(2)),
-        np.empty(most, np.bool_),
-        np.empty(2 * axes),
-        np.zeros(axes),
-        np.empty(most),
-        np.empty((4, 3)),
-    )
 
 
 def _blank(motion: Motion, n: int) -> Found:
