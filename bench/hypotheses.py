@@ -1,8 +1,8 @@
 """What several hypotheses cost: µs an epoch, and how many times the plain filter of the same data.
 
 Run ``python bench/hypotheses.py`` (``--json`` for machines). Fixes of one to three axes of which a
-fifth is wild, with velocities (aided) or without (alone); medians of several rounds in turn. The
-lagged output is what it costs beyond the filter, whose trail it reads.
+fifth is wild, with velocities (aided) or without (alone); medians of several rounds in turn, in
+time of the processor. The lagged output is what it costs beyond the filter, whose trail it reads.
 """
 
 from __future__ import annotations
@@ -106,9 +106,9 @@ def medians(calls: dict[str, Callable[[], object]], epochs: int) -> dict[str, fl
         call()
     for _ in range(ROUNDS):
         for name, call in calls.items():
-            begin = time.perf_counter()
+            begin = time.process_time()
             call()
-            taken[name].append(time.perf_counter() - begin)
+            taken[name].append(time.process_time() - begin)
     return {name: 1e6 * float(np.median(each)) / epochs for name, each in taken.items()}
 
 

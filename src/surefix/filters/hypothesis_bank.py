@@ -39,7 +39,7 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["apply_position", "best_of", "give_rows", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
-_NOUGHT = -45.0  # nats: what is less likely than the best by that adds nothing to a sum
+_NOUGHT = -37.0  # nats: what is less likely than the best by that adds nothing to a sum
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
 
@@ -137,23 +137,29 @@ def keep_best(
     for i in range(total):
         top = max(top, score[i])
     norm = kept = 0.0
+    crowded = False
     count = 0
     for i in range(total):
         gap = score[i] - top
-        if gap > _NOUGHT:
-            norm += math.exp(gap)
+        part = math.exp(gap) if gap > _NOUGHT else 0.0
+        norm += part
         if gap < -_FAR:
             continue
+        kept += part
         j = min(count, most - 1)
-        if count == most and score[i] <= score[chosen[most - 1]]:
-            continue
+        if count == most:
+            crowded = True
+            if score[i] <= score[chosen[most - 1]]:
+                continue
         while j > 0 and score[chosen[j - 1]] < score[i]:
             chosen[j] = chosen[j - 1]
             j -= 1
         chosen[j] = i
         count = min(count + 1, most)
-    for i in range(count):
-        kept += math.exp(score[chosen[i]] - top)
+    if crowded:
+        kept = 0.0
+        for i in range(count):
+            kept += math.exp(score[chosen[i]] - top)
     kept = top + math.log(kept)
     for i in range(count):
         weight[i] = score[chosen[i]] - kept
@@ -310,21 +316,19 @@ def report(
 
     A manoeuvre that just began counts from the next observation on, unless it is the likeliest: a
     wild fix would leave the mixture no mean, however improbable it makes that account. ``share``
-    (k,) are the probabilities of the hypotheses.
+    (k,) are the probabilities of the hypotheses; those that do not count become 0.
     """
     d, order = motion.axes, motion.order
+    for i in range(bank.number[0]):
+        if i != best and said[i] & MANOEUVRE:
+            share[i] = 0.0
     for a in range(d):
         for s in range(order):
-            reference = 0.0
-            total = 0.0
-            square = 0.0
-            within = 0.0
-            whole = 0.0
+            reference = total = square = within = whole = 0.0
             for i in range(bank.number[0]):
-                row = place[i]
-                if (s == 0 and not bank.seen[row, a]) or (i != best and said[i] & MANOEUVRE):
+                row, w = place[i], share[i]
+                if w == 0.0 or (s == 0 and not bank.seen[row, a]):
                     continue
-                w = share[i]
                 if whole == 0.0:
                     reference = bank.mean[row, a, s]
                 gap = bank.mean[row, a, s] - reference

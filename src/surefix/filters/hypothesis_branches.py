@@ -89,6 +89,10 @@ def velocity_branches(
     d, total = motion.axes, 0
     alike_too, fresh = math.log(_ALIKE), math.log(1.0 - _ALIKE)
     turned = math.log(prior.manoeuvre) if prior.manoeuvre > 0.0 else -np.inf
+    rarely = math.log(prior.velocity)
+    mostly = math.log1p(-prior.velocity)
+    again = math.log(prior.again)
+    over = math.log1p(-prior.again)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
         distance = near = square = 0.0
@@ -110,9 +114,9 @@ def velocity_branches(
             wide *= w
             seen += 1
         outside = wild_product(square, wide, seen)
-        out = prior.velocity
+        bad, good = rarely, mostly
         if (bank.faulty[k] >> sensor) & 1:
-            out = prior.again
+            bad, good = again, over
             alike = 0.0
             for a in range(d):
                 c = d + a
@@ -122,19 +126,19 @@ def velocity_branches(
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
-            score[total] = base + inside + math.log1p(-out)
+            score[total] = base + inside + good
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
             total += 1
         if not forced[d] > 0.0:
-            score[total] = base + outside + math.log(out)
+            score[total] = base + outside + bad
             parent[total], code[total] = i, VELOCITY_OUT
             total += 1
         strange = math.isnan(forced[d]) and distance > _STRANGE
         if strange and prior.manoeuvre > 0.0:
             swift = _swift(motion, bank, k, 1, z[d:], variance[d:], time)
             if not math.isnan(swift):
-                score[total] = base + swift + turned + math.log1p(-out)
+                score[total] = base + swift + turned + good
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
     return total
