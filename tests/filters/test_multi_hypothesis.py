@@ -76,6 +76,8 @@ def test_one_call_is_a_call_per_epoch(order, axes):
     one, steps = zip(*parts, strict=True)
     joined = Found(*(np.concatenate(fields) for fields in zip(*one, strict=True)))
     path = Trail(*(np.concatenate(fields) for fields in zip(*steps, strict=True)))
+    counts = np.concatenate([np.diff(step.first) for step in steps])
+    path = path._replace(first=np.append(0, np.cumsum(counts)))
     for a, b in zip((*found, *trail), (*joined, *path), strict=True):
         np.testing.assert_array_equal(a, b)
     used = whole.number[0]

@@ -167,10 +167,22 @@ class Bank(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """Where hypotheses came from: (n, k) previous place and code of each, and (n,) the best."""
+    """Where the hypotheses came from that there were after each of n epochs.
+
+    Parameters
+    ----------
+    parent, code
+        Of each hypothesis its place an epoch before, below 256, and what it says; those of one
+        epoch side by side.
+    first
+        (n + 1,) where those of each epoch begin, and where the last ones end.
+    best
+        (n,) place of the likeliest.
+    """
 
     parent: IntArray
     code: IntArray
+    first: IntArray
     best: IntArray
 
 

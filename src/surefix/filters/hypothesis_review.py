@@ -12,10 +12,10 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
-from surefix.filters.hypothesis_branches import log_normal, log_wild
+from surefix.filters.hypothesis_density import log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
-from surefix.jit import helper, kernel
+from surefix.jit import inner, kernel
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["deleted", "deleted_residuals", "review"]
@@ -101,7 +101,7 @@ def review(
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-@helper
+@inner
 def _patterns(
     axes: int,
     prior: Prior,
