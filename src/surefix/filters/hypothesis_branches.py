@@ -29,6 +29,7 @@ from surefix.types import FloatArray, IntArray
 __all__ = [
     "BRANCHES",
     "CONFIRMED",
+    "ROW",
     "log_normal",
     "log_sum",
     "log_wild",
@@ -41,6 +42,8 @@ BRANCHES = 14
 """Candidates that a hypothesis can have at one epoch, at most."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
+ROW = 2
+"""Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
@@ -204,8 +207,10 @@ def position_branches(
     total = 0
     observed = 0
     mask = 0
+    lead = -1
     for a in range(d):
         if not math.isnan(z[a]):
+            lead = a if lead < 0 else lead
             observed += 1
             mask |= 1 << a
     given = 0  # what is decided beforehand
@@ -256,6 +261,10 @@ def position_branches(
         outside = log_wild(square, scale, observed)
         base = bank.weight[k]
         own = bank.run[k] == sensor
+        wrong = prior.isolated
+        if bank.run[k] < 0 and bank.missed[k, lead] >= ROW and not decided:
+            wrong = prior.row
+            base += math.log1p(-wrong) - math.log1p(-prior.isolated)
         if decided:
             score[total] = base
             for a in range(d):
@@ -279,7 +288,7 @@ def position_branches(
                 code[total] |= DENY
         parent[total] = k
         total += 1
-        score[total] = base + outside + math.log(prior.isolated)
+        score[total] = bank.weight[k] + outside + math.log(wrong)
         parent[total], code[total] = k, mask
         total += 1
         strange = distance > _GROSS and not unknown

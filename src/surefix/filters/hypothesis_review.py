@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
-from surefix.filters.hypothesis_branches import log_normal, log_wild
+from surefix.filters.hypothesis_branches import ROW, log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
 from surefix.jit import helper, kernel
@@ -97,8 +97,33 @@ def review(
     """
     residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
     out = fixed.copy()
-    _review(motion.axes, prior, residual, variance, epochs.variance, locked, out)
+    row = _rows_of_wrong(motion.axes, prior, epochs.z, fixed)
+    _review(motion.axes, prior, residual, variance, epochs.variance, locked, row, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
+
+
+def _rows_of_wrong(
+    axes: int, prior: Prior, z: FloatArray, fixed: FloatArray
+) -> FloatArray:
+    """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it."""
+    odds = np.zeros(len(z))
+    rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
+    lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
+    wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
+    wrong[ROW:-ROW] = fixed[rows, lead] == 0.0
+    more = math.log(prior.row / prior.isolated)
+    less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
+    n = len(rows)
+    for ahead in range(ROW + 1):  # what being wrong says of oneself, of the next …
+        row = np.ones(n, np.bool_)
+        for j in range(ahead - ROW, ahead):
+            row &= wrong[ROW + j : ROW + j + n] | (j == 0)
+        if ahead == 0:
+            gain = more - less
+        else:
+            gain = np.where(wrong[ROW + ahead : ROW + ahead + n], more, less)
+        odds[rows] += np.where(row, gain, 0.0)
+    return odds
 
 
 @helper
@@ -110,6 +135,7 @@ def _patterns(
     wild: FloatArray,
     wide: FloatArray,
     seen: int,
+    row: float,
 ) -> int:
     """Axes that are wrong under the likeliest account of one fix, as a code of the filter."""
     belongs = 0.0
@@ -126,7 +152,7 @@ def _patterns(
     chosen = 0
     if poor + math.log(prior.poor) > best:
         best, chosen = poor + math.log(prior.poor), POOR
-    score = math.log(prior.isolated) + log_wild(square, scale, seen)
+    score = math.log(prior.isolated) + row + log_wild(square, scale, seen)
     if score > best:
         best, chosen = score, mask
     if seen > 1:
@@ -153,6 +179,7 @@ def _review(
     variance: FloatArray,
     noise: FloatArray,
     locked: BoolArray,
+    row: FloatArray,
     out: FloatArray,
 ) -> None:
     inside = np.empty(axes)
@@ -191,7 +218,7 @@ def _review(
                 for a in range(axes):
                     out[k, axes + a] = w if max(good, fair) >= outside else 0.0
                 continue
-            mask = _patterns(axes, prior, inside, poor, wild, wide, seen)
+            mask = _patterns(axes, prior, inside, poor, wild, wide, seen, row[k])
             for a in range(axes):
                 w = POOR_WEIGHT if mask & POOR else 1.0
                 out[k, a] = 0.0 if (mask >> a) & 1 else w

@@ -34,6 +34,7 @@ _SHARES = {
     "partial": (0.2, 50.0),
     "poor": (0.5, 50.0),
     "manoeuvre": (0.02, 100.0),
+    "row": (2.0, 4.0),
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
@@ -176,9 +177,13 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
     turns = (said.jump >> axes > 0).sum()
     total = seen.any(axis=1).sum()
 
-    def share(name: str, count: int) -> float:
+    placed = seen.any(axis=1)
+    alone = whole[placed] & (said.run[placed] == 0)
+    after = alone[:-2] & alone[1:-1]
+
+    def share(name: str, count: int, among: int | None = None) -> float:
         wrong, everything = _SHARES[name]
-        return float((count + wrong) / (total + everything))
+        return float((count + wrong) / ((total if among is None else among) + everything))
 
     spread = prior.spread.copy()
     if out.sum() >= _FEW:
@@ -189,6 +194,7 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
         partial=share("partial", some.sum()),
         poor=share("poor", poor.sum()),
         manoeuvre=share("manoeuvre", turns),
+        row=share("row", (after & alone[2:]).sum(), after.sum()),
         spread=spread,
     )
 
