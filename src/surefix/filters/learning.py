@@ -23,7 +23,7 @@ from surefix.filters.records import Epochs, Motion
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray
 
-__all__ = ["Learnt", "learn", "supposed"]
+__all__ = ["Learnt", "learn", "likelihood", "supposed"]
 
 _ROUNDS = 3
 _ENOUGH = 0.02  # relative change of the figures that ends the rounds
@@ -140,6 +140,35 @@ def learn(
         if _change(before, figures) < _ENOUGH:
             break
     return Learnt(figures, prior)
+
+
+def likelihood(
+    observations: Observations,
+    figures: NoiseFigures,
+    *,
+    order: int,
+    period: float,
+    speed: float,
+    longest: float,
+) -> float:
+    """Log-likelihood of a log before anything is learnt, by which motion models are told apart.
+
+    A run of wrong velocities is explained by a livelier model, unless it may be a run.
+
+    Parameters
+    ----------
+    observations, order, period, speed, longest
+        As for `learn`.
+    figures
+        Those to begin with.
+    """
+    sample = sample_of(observations)
+    axes = sample.z.shape[1] // 2
+    if len(sample.time) < 3 or not np.isfinite(figures.position).any():
+        return -figures.cost
+    prior = supposed(axes, *_usual(figures), speed, longest)._replace(isolated=_MANY)
+    motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
+    return _evidence(motion, figures, prior, epochs, _BRIEFLY)
 
 
 def _motion(figures: NoiseFigures, axes: int, order: int, period: float) -> Motion:

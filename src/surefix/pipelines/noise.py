@@ -8,7 +8,7 @@ import numpy as np
 
 from surefix.cleaning.duplicates import constant_axes
 from surefix.filters.hypotheses import MOST_SENSORS, Prior
-from surefix.filters.learning import learn
+from surefix.filters.learning import learn, likelihood
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
 from surefix.pipelines.options import CleanOptions
@@ -89,7 +89,10 @@ def settle_noise(
         model: _blocks(model, rows, position, velocity, axes, sensors, options)
         for model in options.models
     }
-    model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
+    costs = {name: sum(block.found.cost for block in tried[name]) for name in tried}
+    if options.several and len(tried) > 1:
+        costs = {name: _cost(tried[name], name, speed, longest) for name in tried}
+    model = min(costs, key=costs.__getitem__)
     blocks = tried[model]
     if options.several:
         blocks = [_learnt(block, model, speed, longest) for block in blocks]
@@ -144,6 +147,12 @@ def _blocks(
         floor = (max(quantum[0] / 12.0**0.5, 1e-9), max(quantum[1] / 12.0**0.5, 1e-9))
         out.append(_Block(block, observations, given, floor, found))
     return out
+
+
+def _cost(blocks: list[_Block], model: str, speed: float, longest: float) -> float:
+    """How unlikely the log is under a motion model, if what is wrong may last."""
+    known = {"order": MODELS[model], "period": 0.0, "speed": speed, "longest": longest}
+    return -sum(likelihood(block.observations, block.found, **known) for block in blocks)
 
 
 def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:
