@@ -247,6 +247,7 @@ def _likeliest(
         return first
 
     weight = np.where(said.fixed > 0.0, said.fixed, 1.0)
+    used = sample._replace(z=np.where(said.fixed > 0.0, sample.z, np.nan))
 
     def figures(theta: FloatArray) -> NoiseFigures:
         factor: FloatArray = np.exp(np.clip(theta, -_WIDEST, _WIDEST))
@@ -257,7 +258,7 @@ def _likeliest(
 
     def cost(theta: FloatArray) -> float:
         trial = figures(theta)
-        epochs = _epochs(sample, trial)
+        epochs = _epochs(used, trial)
         epochs = epochs._replace(
             variance=epochs.variance / weight, fixed=said.fixed, jump=said.jump
         )
