@@ -103,7 +103,7 @@ class Prior(NamedTuple):
     spread: FloatArray
     sigma_velocity: float
     adapt: FloatArray = np.zeros(MOST_SENSORS)
-    row: float = 0.5
+    row: float = 0.3
 
 
 class Bank(NamedTuple):

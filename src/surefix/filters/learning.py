@@ -34,7 +34,7 @@ _SHARES = {
     "partial": (0.2, 50.0),
     "poor": (0.5, 50.0),
     "manoeuvre": (0.02, 100.0),
-    "row": (2.0, 4.0),
+    "row": (1.0, 3.0),
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
