@@ -26,7 +26,7 @@ from surefix.types import FloatArray
 __all__ = ["Learnt", "learn", "likelihood", "supposed"]
 
 _ROUNDS = 3
-_ENOUGH = 0.02  # relative change of the figures that ends the rounds
+_ENOUGH = 0.02  # relative change of the figures, and change of the shares, that ends the rounds
 _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
 _LEAST_WILD = 5.0  # … and at least
 _SHARES = {
@@ -134,10 +134,10 @@ def learn(
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        supposed_before, before = prior, figures
         prior = _counted(prior, said, residual, math.sqrt(float(np.median(epochs.variance))))
-        before = figures
         figures = _likeliest(sample, said, prior, given, before, least, motion)
-        if _change(before, figures) < _ENOUGH:
+        if _change(before, figures) < _ENOUGH and _moved(supposed_before, prior) < _ENOUGH:
             break
     return Learnt(figures, prior)
 
@@ -324,3 +324,8 @@ def _change(before: NoiseFigures, after: NoiseFigures) -> float:
     pairs = [*zip(before.position, after.position, strict=True)]
     pairs += [*zip(before.velocity, after.velocity, strict=True), (before.process, after.process)]
     return max(abs(math.log(b / a)) for a, b in pairs if a > 0.0 and b > 0.0)
+
+
+def _moved(before: Prior, after: Prior) -> float:
+    """Largest change of the shares of fixes that are wrong, on all axes or on some."""
+    return max(abs(after.isolated - before.isolated), abs(after.partial - before.partial))
