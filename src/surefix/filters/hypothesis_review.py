@@ -102,11 +102,9 @@ def review(
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-def _rows_of_wrong(
-    axes: int, prior: Prior, z: FloatArray, fixed: FloatArray
-) -> FloatArray:
+def _rows_of_wrong(axes: int, prior: Prior, z: FloatArray, fixed: FloatArray) -> FloatArray:
     """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it."""
-    odds = np.zeros(len(z))
+    odds: FloatArray = np.zeros(len(z))
     rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
     lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
     wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
@@ -114,14 +112,12 @@ def _rows_of_wrong(
     more = math.log(prior.row / prior.isolated)
     less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
     n = len(rows)
-    for ahead in range(ROW + 1):  # what being wrong says of oneself, of the next …
+    for ahead in range(ROW + 1):  # what being wrong says of oneself, of the next, …
         row = np.ones(n, np.bool_)
         for j in range(ahead - ROW, ahead):
             row &= wrong[ROW + j : ROW + j + n] | (j == 0)
-        if ahead == 0:
-            gain = more - less
-        else:
-            gain = np.where(wrong[ROW + ahead : ROW + ahead + n], more, less)
+        also = wrong[ROW + ahead : ROW + ahead + n] | (ahead == 0)
+        gain = np.where(also, more, less) - (less if ahead == 0 else 0.0)
         odds[rows] += np.where(row, gain, 0.0)
     return odds
 

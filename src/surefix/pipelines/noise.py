@@ -89,13 +89,10 @@ def settle_noise(
         model: _blocks(model, rows, position, velocity, axes, sensors, options)
         for model in options.models
     }
-    costs = {name: sum(block.found.cost for block in tried[name]) for name in tried}
-    if options.several and len(tried) > 1:
-        costs = {name: _cost(tried[name], name, speed, longest) for name in tried}
-    model = min(costs, key=costs.__getitem__)
+    model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
     blocks = tried[model]
     if options.several:
-        blocks = [_learnt(block, model, speed, longest) for block in blocks]
+        model, blocks = _learnt_best(tried, model, speed, longest)
     sigma_position = np.full((len(sensors), 3), np.nan)
     sigma_velocity = np.full((len(sensors), 3), np.nan)
     density = np.zeros(len(axes))
@@ -149,10 +146,36 @@ def _blocks(
     return out
 
 
-def _cost(blocks: list[_Block], model: str, speed: float, longest: float) -> float:
-    """How unlikely the log is under a motion model, if what is wrong may last."""
-    known = {"order": MODELS[model], "period": 0.0, "speed": speed, "longest": longest}
-    return -sum(likelihood(block.observations, block.found, **known) for block in blocks)
+def _learnt_best(
+    tried: dict[str, list[_Block]], plain: str, speed: float, longest: float
+) -> tuple[str, list[_Block]]:
+    """Learn under the likelier motion model; under both, where what is wrong may last or not.
+
+    A run of wrong velocities looks like a livelier motion to the ``plain`` choice, which judges
+    each by itself; the other one depends on figures that are not learnt yet.
+    """
+
+    def fit(name: str, blocks: list[_Block]) -> float:
+        return sum(
+            likelihood(
+                block.observations,
+                block.found,
+                order=MODELS[name],
+                period=0.0,
+                speed=speed,
+                longest=longest,
+            )
+            for block in blocks
+        )
+
+    likely = plain if len(tried) == 1 else max(tried, key=lambda name: fit(name, tried[name]))
+    learnt = {
+        name: [_learnt(block, name, speed, longest) for block in tried[name]]
+        for name in sorted({plain, likely})
+    }
+    if len(learnt) > 1:
+        likely = max(learnt, key=lambda name: fit(name, learnt[name]))
+    return likely, learnt[likely]
 
 
 def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:
