@@ -97,23 +97,28 @@ def review(
     """
     residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
     out = fixed.copy()
-    row = _rows_of_wrong(motion.axes, prior, epochs.z, fixed)
+    row = _rows_of_wrong(motion.axes, prior, epochs.z, fixed, locked)
     _review(motion.axes, prior, residual, variance, epochs.variance, locked, row, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-def _rows_of_wrong(axes: int, prior: Prior, z: FloatArray, fixed: FloatArray) -> FloatArray:
-    """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it."""
+def _rows_of_wrong(
+    axes: int, prior: Prior, z: FloatArray, fixed: FloatArray, locked: BoolArray
+) -> FloatArray:
+    """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it.
+
+    Those of a run with a common offset are another matter.
+    """
     odds: FloatArray = np.zeros(len(z))
     rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
     lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
     wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
-    wrong[ROW:-ROW] = fixed[rows, lead] == 0.0
+    wrong[ROW:-ROW] = (fixed[rows, lead] == 0.0) & ~locked[rows, 0]
     more = math.log(prior.row / prior.isolated)
     less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
     n = len(rows)
     for ahead in range(ROW + 1):  # what being wrong says of oneself, of the next, …
-        row = np.ones(n, np.bool_)
+        row = np.arange(n) < n - ahead
         for j in range(ahead - ROW, ahead):
             row &= wrong[ROW + j : ROW + j + n] | (j == 0)
         also = wrong[ROW + ahead : ROW + ahead + n] | (ahead == 0)
