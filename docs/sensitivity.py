@@ -44,7 +44,7 @@ CONSTANTS: Final[Mapping[str, str]] = MappingProxyType(
         "hypothesis_bank._FAR": "size",
         "hypothesis_branches._AIDED": "size",
         "hypothesis_branches._ALIKE": "odds",
-        "hypothesis_branches._GROSS": "size",
+        "hypothesis_branches.GROSS": "size",
         "hypothesis_branches._PATIENCE": "size",
         "hypothesis_branches._PREFERS": "size",
         "hypothesis_branches._STRANGE": "size",

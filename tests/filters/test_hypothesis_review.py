@@ -16,10 +16,10 @@ MOTION = Motion(2, 1, np.ones(1), by_axis(1), 2, 0.0)
 PRIOR = supposed(1, 1.0, 1.0, 1.0, 40.0)
 
 
-def judged(off, wrong, *, row, k, run=()):
+def judged(off, wrong, *, row, k, run=(), far=60.0):
     """Weight of fix k, which is ``off``, if the fixes ``wrong`` are left out; noise is 1."""
     z = np.full((N, 2), np.nan)
-    z[:, 0] = np.where(wrong, 60.0, 0.0)
+    z[:, 0] = np.where(wrong, far, 0.0)
     z[k, 0] = off
     epochs = Epochs(
         np.arange(float(N)),
@@ -76,3 +76,10 @@ def test_a_run_is_no_row(run):
     """After a run with a common offset the next fix is as good as any."""
     wrong = np.array([True, True, True, False, True, True, True])
     assert (judged(1.5, wrong, row=0.85, k=3, run=[j for j in run if j != 3]) > 0.0) == bool(run)
+
+
+def test_what_is_hardly_wrong_makes_no_row():
+    """A sensor that wanders would confirm itself."""
+    wrong = np.array([True, True, True, False, True, True, True])
+    for far, used in ((5.0, True), (7.0, False)):
+        assert (judged(1.5, wrong, row=0.85, k=3, far=far) > 0.0) == used

@@ -29,6 +29,7 @@ from surefix.types import FloatArray, IntArray
 __all__ = [
     "BRANCHES",
     "CONFIRMED",
+    "GROSS",
     "ROW",
     "log_normal",
     "log_sum",
@@ -40,14 +41,15 @@ __all__ = [
 
 BRANCHES = 14
 """Candidates that a hypothesis can have at one epoch, at most."""
+GROSS = 36.0
+"""Squared distance from which a run can begin: less is noise, however it persists."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
-_GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
-_STRANGE = 16.0  # … and from which a manoeuvre is thought of
+_STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
 _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
@@ -291,7 +293,7 @@ def position_branches(
         score[total] = bank.weight[k] + outside + math.log(wrong)
         parent[total], code[total] = k, mask
         total += 1
-        strange = distance > _GROSS and not unknown
+        strange = distance > GROSS and not unknown
         if strange and (bank.run[k] < 0 or own):
             score[total] = base + outside + math.log(prior.burst)
             parent[total], code[total] = k, OPEN

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
-from surefix.filters.hypothesis_branches import ROW, log_normal, log_wild
+from surefix.filters.hypothesis_branches import GROSS, ROW, log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
 from surefix.jit import helper, kernel
@@ -97,23 +97,24 @@ def review(
     """
     residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
     out = fixed.copy()
-    row = _rows_of_wrong(motion.axes, prior, epochs.z, fixed, locked)
-    _review(motion.axes, prior, residual, variance, epochs.variance, locked, row, out)
+    d = motion.axes
+    far = np.nansum(residual[:, :d] ** 2 / variance[:, :d], axis=1) > GROSS
+    row = _rows_of_wrong(d, prior, epochs.z, (fixed == 0.0) & (far & ~locked[:, 0])[:, None])
+    _review(d, prior, residual, variance, epochs.variance, locked, row, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-def _rows_of_wrong(
-    axes: int, prior: Prior, z: FloatArray, fixed: FloatArray, locked: BoolArray
-) -> FloatArray:
+def _rows_of_wrong(axes: int, prior: Prior, z: FloatArray, out: BoolArray) -> FloatArray:
     """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it.
 
+    Of these only gross errors count, ``out`` (n, m): a sensor that wanders would confirm itself.
     Those of a run with a common offset are another matter.
     """
     odds: FloatArray = np.zeros(len(z))
     rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
     lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
     wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
-    wrong[ROW:-ROW] = (fixed[rows, lead] == 0.0) & ~locked[rows, 0]
+    wrong[ROW:-ROW] = out[rows, lead]
     more = math.log(prior.row / prior.isolated)
     less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
     n = len(rows)
