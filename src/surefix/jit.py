@@ -48,7 +48,7 @@ class _Watch(event.Listener):  # type: ignore[misc]  # numba has no types
         if self._depth == 1:
             self._tell(str(event.data["dispatcher"].py_func.__name__))
 
-    def on_end(self, event: event.Event) -> None:
+    def on_end(self, event: event.Event) -> None:  # noqa: ARG002
         self._depth -= 1
 
 

@@ -87,6 +87,8 @@ class Prior(NamedTuple):
     adapt
         (`MOST_SENSORS`,) how fast the noise of the positions of each sensor follows what is
         observed: 1 over the number of observations remembered, 0 for not at all.
+    row
+        Probability that a fix is wrong by itself if the two before it were.
     """
 
     isolated: float
@@ -101,6 +103,7 @@ class Prior(NamedTuple):
     spread: FloatArray
     sigma_velocity: float
     adapt: FloatArray = np.zeros(MOST_SENSORS)
+    row: float = 0.3
 
 
 class Bank(NamedTuple):

@@ -37,18 +37,23 @@ from surefix.types import FloatArray, IntArray
 __all__ = [
     "BRANCHES",
     "CONFIRMED",
+    "GROSS",
+    "ROW",
     "position_branches",
     "velocity_branches",
 ]
 
 BRANCHES = 14
 """Candidates that a hypothesis can have at one epoch, at most."""
+GROSS = 36.0
+"""Squared distance from which a run can begin: less is noise, however it persists."""
 CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
+ROW = 2
+"""Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
-_GROSS = 36.0  # squared distance from which a run can begin: less is noise, however it persists
-_STRANGE = 16.0  # … and from which a manoeuvre is thought of
+_STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
 _PATIENCE = 1.25  # longest runs of unbroken rejection after which the track may begin anew …
 _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
@@ -194,8 +199,10 @@ def position_branches(
     total = 0
     observed = 0
     mask = 0
+    lead = -1
     for a in range(d):
         if not math.isnan(z[a]):
+            lead = a if lead < 0 else lead
             observed += 1
             mask |= 1 << a
     given = 0  # what is decided beforehand
@@ -213,6 +220,7 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
+    in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
         running, own = bank.run[k] >= 0, bank.run[k] == sensor
@@ -246,6 +254,10 @@ def position_branches(
             volume *= S[a]
             square += wild[a]
             whole *= wide[a]
+        usual, wrong = base, isolated
+        if not running and bank.missed[k, lead] >= ROW and not decided:
+            wrong = in_row
+            base += rarer
         if decided:
             score[total] = base
             for a in range(d):
@@ -273,13 +285,13 @@ def position_branches(
                 code[total] |= DENY
         parent[total] = i
         total += 1
-        outside = base + wild_product(square, whole, observed)
-        score[total] = outside + isolated
+        outside = wild_product(square, whole, observed)
+        score[total] = usual + outside + wrong
         parent[total], code[total] = i, mask
         total += 1
-        strange = distance > _GROSS and not unknown
+        strange = distance > GROSS and not unknown
         if strange and (own or not running):
-            score[total] = outside + burst
+            score[total] = base + outside + burst
             parent[total], code[total] = i, OPEN
             total += 1
         strange = distance > _STRANGE and not unknown
