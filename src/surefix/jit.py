@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeVar, cast
 
 import numba
 
-__all__ = ["helper", "kernel"]
+__all__ = ["helper", "inlined", "kernel", "parallel_kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -28,3 +28,19 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
         Callable[P, T],
         numba.njit(cache=True, error_model="numpy", inline="never")(function),
     )
+
+
+def inlined(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function that is made part of the machine code of each kernel that calls it.
+
+    Sizes that the caller knows (see `surefix.rows`) are then known inside, and no array is counted
+    on the way. A product and a sum may become one instruction.
+    """
+    compiled = numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})(function)
+    return cast(Callable[P, T], compiled)
+
+
+def parallel_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel whose ``numba.prange`` loops run on all cores."""
+    compiled = numba.njit(cache=True, error_model="numpy", parallel=True, nogil=True)(function)
+    return cast(Callable[P, T], compiled)

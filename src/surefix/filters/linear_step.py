@@ -1,0 +1,378 @@
+"""Kernels of the filter of a linear model: one epoch, series, and many series at once.
+
+Covariance form. The innovation covariance is reduced to ``S = L D Lᵀ`` while the same row
+operations turn ``H P`` into ``L⁻¹ H P``; each pivot then takes its share from P. That loses as many
+digits as the noise is smaller than the prediction, so epochs in which a variance falls by more than
+`_FALL` go by Joseph's form, ``(I − K H) P (I − K H)ᵀ + K R̄ Kᵀ``, which loses none.
+
+Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977; Joseph's form:
+Bar-Shalom, Li and Kirubarajan, 2001, 5.2.3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from surefix.jit import inlined, kernel, parallel_kernel
+from surefix.robust.loss import Loss, weight
+from surefix.rows import ONE, Size, add_row, clear_row, copy_row, scratch, width
+from surefix.types import FloatArray
+
+__all__ = ["LinearModel", "run_many", "run_series", "step"]
+
+_FALL = 1e4  # ratio of S to R̄ above which the short form would lose more than four digits
+
+
+class LinearModel(NamedTuple):
+    """``x' = F x + w``, ``z = H x + v``; made by `surefix.filters.linear.linear_model`.
+
+    Each matrix is a stack: of one for all epochs, or of one for each.
+
+    Parameters
+    ----------
+    F, F_T, Q
+        (1 or N, n, n) transition, its transpose, and process noise.
+    H, H_T
+        (1 or N, m, n) and (1 or N, n, m).
+    R
+        (1 or N, m, m).
+    states, components
+        Sizes n and m for the compiler, see `surefix.rows`.
+    """
+
+    F: FloatArray
+    F_T: FloatArray
+    Q: FloatArray
+    H: FloatArray
+    H_T: FloatArray
+    R: FloatArray
+    states: Size
+    components: Size
+
+
+@inlined
+def _predict(
+    x: FloatArray,
+    P: FloatArray,
+    y: FloatArray,
+    A: FloatArray,
+    F: FloatArray,
+    F_T: FloatArray,
+    f: int,
+    Q: FloatArray,
+    q: int,
+    states: Size,
+) -> None:
+    """``x = F x``, ``P = F P Fᵀ + Q`` with the matrices that begin at rows f and q."""
+    n = width(states)
+    clear_row(y, 0, states)
+    for i in range(n):
+        add_row(y, 0, x[0, i], F_T, f + i, states)
+    copy_row(x, 0, y, 0, states)
+    for i in range(n):
+        clear_row(A, i, states)
+        for j in range(n):
+            add_row(A, i, F[f + i, j], P, j, states)
+    for i in range(n):
+        copy_row(P, i, Q, q + i, states)
+        for j in range(n):
+            add_row(P, i, A[i, j], F_T, f + j, states)
+
+
+@inlined
+def _innovate(
+    x: FloatArray,
+    P: FloatArray,
+    e: FloatArray,
+    B: FloatArray,
+    S: FloatArray,
+    H: FloatArray,
+    H_T: FloatArray,
+    h: int,
+    R: FloatArray,
+    r: int,
+    states: Size,
+    components: Size,
+) -> None:
+    """``e = z − H x`` in place of z, ``B = H P`` and ``S = H P Hᵀ + R``."""
+    n, m = width(states), width(components)
+    for j in range(n):
+        add_row(e, 0, -x[0, j], H_T, h * n + j, components)
+    for c in range(m):
+        clear_row(B, c, states)
+        for j in range(n):
+            add_row(B, c, H[h * m + c, j], P, j, states)
+        copy_row(S, c, R, r + c, components)
+        for j in range(n):
+            add_row(S, c, B[c, j], H_T, h * n + j, components)
+
+
+@inlined
+def _weigh(
+    e: FloatArray,
+    S: FloatArray,
+    R: FloatArray,
+    r: int,
+    used: FloatArray,
+    root: FloatArray,
+    loss: Loss,
+    by_noise: bool,
+    components: Size,
+) -> bool:
+    """Weigh the components, ``R̄_ij = R_ij / √(w_i w_j)``; whether some variance falls far.
+
+    ``used`` is 0 for what is left out, whose innovation becomes 0; ``root`` is ``1 / √w``.
+    """
+    m = width(components)
+    changed = far = False
+    for c in range(m):
+        root[0, c] = 1.0
+        used[0, c] = 1.0
+        if not abs(e[0, c]) < np.inf:
+            used[0, c] = e[0, c] = 0.0
+        elif loss.code != 0:
+            variance = R[r + c, c] if by_noise else S[c, c]
+            w = weight(abs(e[0, c]) / math.sqrt(variance), loss.code, loss.k0, loss.k1)
+            if w < 1.0:
+                changed = True
+                used[0, c] = 1.0 if w > 0.0 else 0.0
+                root[0, c] = 1.0 / math.sqrt(w) if w > 0.0 else 1.0
+        if S[c, c] > _FALL * R[r + c, c]:
+            far = True
+    if changed:
+        for c in range(m):
+            for d in range(m):
+                S[c, d] += R[r + c, d] * (root[0, c] * root[0, d] - 1.0)
+    return far
+
+
+@inlined
+def _eliminate(
+    x: FloatArray,
+    e: FloatArray,
+    B: FloatArray,
+    S: FloatArray,
+    L: FloatArray,
+    used: FloatArray,
+    states: Size,
+    components: Size,
+) -> None:
+    """``B = L⁻¹ H P``, the mean, and the inverse pivots in ``used``; −L below its diagonal."""
+    m = width(components)
+    for c in range(m):
+        inverse = used[0, c] / S[c, c]
+        used[0, c] = inverse
+        share = inverse * e[0, c]
+        add_row(x, 0, share, B, c, states)
+        for d in range(c + 1, m):
+            l = -S[d, c] * inverse
+            L[d, c] = l
+            add_row(S, d, l, S, c, components)
+            add_row(B, d, l, B, c, states)
+        add_row(e, 0, -share, S, c, components)
+
+
+@inlined
+def _joseph(
+    P: FloatArray,
+    A: FloatArray,
+    B: FloatArray,
+    L: FloatArray,
+    used: FloatArray,
+    root: FloatArray,
+    H: FloatArray,
+    h: int,
+    R: FloatArray,
+    r: int,
+    states: Size,
+    components: Size,
+) -> None:
+    """Joseph's form in the innovations ``L⁻¹ e``, whose gains are ``B[c] · used[c]``."""
+    n, m = width(states), width(components)
+    rows, noise = scratch(components, states), scratch(components, components)
+    turned, W = scratch(components, components), scratch(states, states)
+    W_T, spread = scratch(states, states), scratch(components, states)
+    for c in range(m):
+        copy_row(rows, c, H, h + c, states)
+        for d in range(m):
+            noise[c, d] = R[r + c, d] * root[0, c] * root[0, d]
+    for c in range(m):
+        for d in range(c + 1, m):
+            add_row(rows, d, L[d, c], rows, c, states)
+            add_row(noise, d, L[d, c], noise, c, components)
+    for c in range(m):
+        for d in range(m):
+            turned[c, d] = noise[d, c]
+    for c in range(m):
+        for d in range(c + 1, m):
+            add_row(turned, d, L[d, c], turned, c, components)
+    for i in range(n):
+        clear_row(W, i, states)
+        W[i, i] = 1.0
+        for c in range(m):
+            add_row(W, i, -B[c, i] * used[0, c], rows, c, states)
+        for j in range(n):
+            W_T[j, i] = W[i, j]
+    for i in range(n):
+        clear_row(A, i, states)
+        for j in range(n):
+            add_row(A, i, W[i, j], P, j, states)
+    for c in range(m):
+        clear_row(spread, c, states)
+        for d in range(m):
+            add_row(spread, c, turned[c, d] * used[0, d], B, d, states)
+    for i in range(n):
+        clear_row(P, i, states)
+        for j in range(n):
+            add_row(P, i, A[i, j], W_T, j, states)
+        for c in range(m):
+            add_row(P, i, B[c, i] * used[0, c], spread, c, states)
+
+
+@inlined
+def _series(
+    model: LinearModel,
+    loss: Loss,
+    by_noise: bool,
+    start: FloatArray,
+    first: FloatArray,
+    z: FloatArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+    residual: FloatArray,
+    nis: FloatArray,
+    weights: FloatArray,
+) -> None:
+    """Filter z (N, m) from the mean (1, n) and covariance (n, n); covariances go to (N·n, n)."""
+    states, components = model.states, model.components
+    n, m = width(states), width(components)
+    x, y, e = scratch(ONE, states), scratch(ONE, states), scratch(ONE, components)
+    used, root = scratch(ONE, components), scratch(ONE, components)
+    P, A = scratch(states, states), scratch(states, states)
+    B, S, L = (
+        scratch(components, states),
+        scratch(components, components),
+        scratch(components, components),
+    )
+    F, F_T, Q = model.F.reshape(-1, n), model.F_T.reshape(-1, n), model.Q.reshape(-1, n)
+    H, H_T, R = model.H.reshape(-1, n), model.H_T.reshape(-1, m), model.R.reshape(-1, m)
+    f_step, q_step = int(len(model.F) > 1), int(len(model.Q) > 1)
+    h_step, r_step = int(len(model.H) > 1), int(len(model.R) > 1)
+    copy_row(x, 0, start, 0, states)
+    for i in range(n):
+        copy_row(P, i, first, i, states)
+    for k in range(z.shape[0]):
+        f, q, h, r = f_step * k * n, q_step * k * n, h_step * k, r_step * k * m
+        _predict(x, P, y, A, F, F_T, f, Q, q, states)
+        copy_row(e, 0, z, k, components)
+        _innovate(x, P, e, B, S, H, H_T, h, R, r, states, components)
+        for c in range(m):
+            residual[k, c] = e[0, c]
+            nis[k, c] = e[0, c] * e[0, c] / S[c, c]
+        far = _weigh(e, S, R, r, used, root, loss, by_noise, components)
+        for c in range(m):
+            w = used[0, c] / (root[0, c] * root[0, c])
+            weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
+        _eliminate(x, e, B, S, L, used, states, components)
+        if far:
+            _joseph(P, A, B, L, used, root, H, h * m, R, r, states, components)
+        else:
+            for c in range(m):
+                for i in range(n):
+                    add_row(P, i, -B[c, i] * used[0, c], B, c, states)
+        copy_row(mean, k, x, 0, states)
+        for i in range(n):
+            copy_row(covariance, k * n + i, P, i, states)
+
+
+@kernel
+def run_series(
+    model: LinearModel,
+    loss: Loss,
+    by_noise: bool,
+    start: FloatArray,
+    first: FloatArray,
+    z: FloatArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+    residual: FloatArray,
+    nis: FloatArray,
+    weights: FloatArray,
+) -> None:
+    """One series; the arrays as for `_series`."""
+    _series(model, loss, by_noise, start, first, z, mean, covariance, residual, nis, weights)
+
+
+@parallel_kernel
+def run_many(
+    model: LinearModel,
+    loss: Loss,
+    by_noise: bool,
+    start: FloatArray,
+    first: FloatArray,
+    z: FloatArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+    residual: FloatArray,
+    nis: FloatArray,
+    weights: FloatArray,
+) -> None:
+    """Many series, a leading axis on all arrays, on all cores."""
+    for t in numba.prange(z.shape[0]):
+        _series(
+            model,
+            loss,
+            by_noise,
+            start[t],
+            first[t],
+            z[t],
+            mean[t],
+            covariance[t],
+            residual[t],
+            nis[t],
+            weights[t],
+        )
+
+
+@kernel
+def step(
+    packed: FloatArray, states: Size, components: Size, state: FloatArray, z: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """One epoch; for `surefix.filters.linear.advance`, which says what comes in and out.
+
+    ``packed`` holds F, Fᵀ, Q, H, Hᵀ, R, and code, k₀ and k₁ of the loss: one array is unpacked
+    sooner than nine.
+    """
+    n, m = width(states), width(components)
+    a, b, c = n * n, 3 * n * n, 3 * n * n + 2 * n * m
+    model = LinearModel(
+        packed[:a].reshape(1, n, n),
+        packed[a : 2 * a].reshape(1, n, n),
+        packed[2 * a : b].reshape(1, n, n),
+        packed[b : b + n * m].reshape(1, m, n),
+        packed[b + n * m : c].reshape(1, n, m),
+        packed[c : c + m * m].reshape(1, m, m),
+        states,
+        components,
+    )
+    d = c + m * m
+    loss = Loss(int(packed[d]), packed[d + 1], packed[d + 2], 1.0, 1.0, 0)
+    after, seen = np.empty((n + 1, n)), np.empty((3, m))
+    _series(
+        model,
+        loss,
+        False,
+        state[:1],
+        state[1:],
+        z.reshape(1, m),
+        after[:1],
+        after[1:],
+        seen[:1],
+        seen[1:2],
+        seen[2:],
+    )
+    return after, seen

@@ -1,0 +1,230 @@
+"""Rows of small matrices as vectors whose size the compiler knows, for kernels.
+
+A *size* is ``(None,) * n`` or the whole number n. The length of a tuple is part of its type, so a
+kernel that takes one is compiled for that n, once, when it is first called with it, and cached on
+disk like any other: its rows live in vector registers and its scratch on the stack. With a plain
+number the same source runs at any size on scratch from the heap, at a third of the speed.
+
+Matrices are C-contiguous and exactly as wide as the size says; rows are ``A[i, :]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TypeAlias
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import lower_builtin, type_callable
+from numba.np import arrayobj
+
+from surefix.types import FloatArray
+
+__all__ = ["ONE", "Size", "add_row", "clear_row", "copy_row", "scratch", "size_of", "width"]
+
+Size: TypeAlias = tuple[None, ...] | int
+"""A size known to the compiler, or a plain number."""
+
+ONE: Size = (None,)
+"""Size of a matrix of one row: a vector."""
+
+_LARGEST = 9
+
+_CONTRACT = ("contract",)  # a product and a sum may become one instruction
+
+
+def size_of(n: int) -> Size:
+    """Size to call a kernel with: a tuple for 1 … 9.
+
+    >>> size_of(3), size_of(12)
+    ((None, None, None), 12)
+    """
+    return (None,) * n if 1 <= n <= _LARGEST else n
+
+
+def width(size: Size) -> int:
+    """How many columns a size stands for; callable from kernels and from Python."""
+    return size if isinstance(size, int) else len(size)
+
+
+def scratch(rows: Size, columns: Size) -> FloatArray:
+    """Matrix (rows, columns) of undefined content; on the stack where both sizes are tuples.
+
+    To be called outside of loops, and not to be returned.
+    """
+    return np.empty((width(rows), width(columns)))
+
+
+def add_row(A: FloatArray, i: int, factor: float, B: FloatArray, k: int, size: Size) -> None:
+    """``A[i] += factor · B[k]``."""
+    A[i] += factor * B[k]
+
+
+def copy_row(A: FloatArray, i: int, B: FloatArray, k: int, size: Size) -> None:
+    """``A[i] = B[k]``."""
+    A[i] = B[k]
+
+
+def clear_row(A: FloatArray, i: int, size: Size) -> None:
+    """``A[i] = 0``."""
+    A[i] = 0.0
+
+
+# What follows teaches the compiler these five functions. They are built in, not overloaded, since an
+# overload is a function of its own to compile for each kind of its arguments.
+
+_MATRIX = types.Array(types.float64, 2, "C")
+
+
+@type_callable(width)  # type: ignore[untyped-decorator]
+def _type_width(_: Any) -> Any:
+    return lambda size: types.intp
+
+
+@type_callable(scratch)  # type: ignore[untyped-decorator]
+def _type_scratch(_: Any) -> Any:
+    return lambda rows, columns: _MATRIX
+
+
+@type_callable(add_row)  # type: ignore[untyped-decorator]
+def _type_add_row(_: Any) -> Any:
+    return lambda A, i, factor, B, k, size: types.void
+
+
+@type_callable(copy_row)  # type: ignore[untyped-decorator]
+def _type_copy_row(_: Any) -> Any:
+    return lambda A, i, B, k, size: types.void
+
+
+@type_callable(clear_row)  # type: ignore[untyped-decorator]
+def _type_clear_row(_: Any) -> Any:
+    return lambda A, i, size: types.void
+
+
+@lower_builtin(width, types.BaseTuple)  # type: ignore[untyped-decorator]
+@lower_builtin(width, types.Integer)  # type: ignore[untyped-decorator]
+def _width(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return _number(context, builder, signature.args[0], args[0])
+
+
+@lower_builtin(scratch, types.BaseTuple, types.BaseTuple)  # type: ignore[untyped-decorator]
+def _scratch_on_stack(context: Any, builder: Any, signature: Any, _args: Any) -> Any:
+    n, m = (len(each) for each in signature.args)
+    data = cgutils.alloca_once(builder, ir.DoubleType(), size=n * m)
+    data.align = 64
+    array = arrayobj.make_array(_MATRIX)(context, builder)
+    count = [context.get_constant(types.intp, each) for each in (n, m, 8 * m, 8)]
+    arrayobj.populate_array(
+        array,
+        data=data,
+        shape=cgutils.pack_array(builder, count[:2]),
+        strides=cgutils.pack_array(builder, count[2:]),
+        itemsize=count[3],
+        meminfo=None,
+    )
+    return array._getvalue()
+
+
+@lower_builtin(scratch, types.Any, types.Any)  # type: ignore[untyped-decorator]
+def _scratch_on_heap(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    size = [_number(context, builder, *each) for each in zip(signature.args, args, strict=True)]
+    plain = _MATRIX(types.intp, types.intp)
+    return context.compile_internal(builder, lambda rows, columns: np.empty((rows, columns)), plain, size)
+
+
+@lower_builtin(add_row, *([types.Any] * 6))  # type: ignore[untyped-decorator]
+def _add_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, i, factor, b, k, size = signature.args
+    target = _start(context, builder, a, args[0], i, args[1], size, args[5])
+    source = _start(context, builder, b, args[3], k, args[4], size, args[5])
+    number = context.cast(builder, args[2], factor, types.float64)
+
+    def add(at: Any, of: Any, times: Any) -> None:
+        product = builder.fmul(times, _load(builder, of), flags=_CONTRACT)
+        _store(builder, builder.fadd(_load(builder, at), product, flags=_CONTRACT), at)
+
+    if isinstance(size, types.BaseTuple):
+        n = len(size)
+        vector = _vector(n)
+        undefined = ir.Constant(vector, ir.Undefined)
+        first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), n), [0] * n)
+        spread = builder.shuffle_vector(first, undefined, everywhere)
+        add(_as_vector(builder, target, n), _as_vector(builder, source, n), spread)
+    else:
+        with _columns(context, builder, size, args[5]) as j:
+            add(builder.gep(target, [j]), builder.gep(source, [j]), number)
+    return context.get_dummy_value()
+
+
+@lower_builtin(copy_row, *([types.Any] * 5))  # type: ignore[untyped-decorator]
+def _copy_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, i, b, k, size = signature.args
+    target = _start(context, builder, a, args[0], i, args[1], size, args[4])
+    source = _start(context, builder, b, args[2], k, args[3], size, args[4])
+    if isinstance(size, types.BaseTuple):
+        n = len(size)
+        value = _load(builder, _as_vector(builder, source, n))
+        _store(builder, value, _as_vector(builder, target, n))
+    else:
+        with _columns(context, builder, size, args[4]) as j:
+            _store(builder, _load(builder, builder.gep(source, [j])), builder.gep(target, [j]))
+    return context.get_dummy_value()
+
+
+@lower_builtin(clear_row, *([types.Any] * 3))  # type: ignore[untyped-decorator]
+def _clear_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, i, size = signature.args
+    target = _start(context, builder, a, args[0], i, args[1], size, args[2])
+    if isinstance(size, types.BaseTuple):
+        n = len(size)
+        _store(builder, ir.Constant(_vector(n), [0.0] * n), _as_vector(builder, target, n))
+    else:
+        with _columns(context, builder, size, args[2]) as j:
+            _store(builder, ir.Constant(ir.DoubleType(), 0.0), builder.gep(target, [j]))
+    return context.get_dummy_value()
+
+
+def _number(context: Any, builder: Any, kind: Any, size: Any) -> Any:
+    """What `width` gives."""
+    if isinstance(kind, types.BaseTuple):
+        return context.get_constant(types.intp, len(kind))
+    return context.cast(builder, size, kind, types.intp)
+
+
+def _start(
+    context: Any, builder: Any, kind: Any, matrix: Any, index: Any, row: Any, size: Any, n: Any
+) -> Any:
+    """Pointer to the first number of a row."""
+    data = arrayobj.make_array(kind)(context, builder, matrix).data
+    columns = _number(context, builder, size, n)
+    at = builder.mul(context.cast(builder, row, index, types.intp), columns)
+    return builder.gep(data, [at])
+
+
+@contextmanager
+def _columns(context: Any, builder: Any, kind: Any, size: Any) -> Iterator[Any]:
+    """Loop over the columns where their number is not known; gives the index."""
+    with cgutils.for_range(builder, _number(context, builder, kind, size)) as loop:
+        yield loop.index
+
+
+def _vector(n: int) -> Any:
+    return ir.VectorType(ir.DoubleType(), n)
+
+
+def _as_vector(builder: Any, row: Any, n: int) -> Any:
+    return builder.bitcast(row, _vector(n).as_pointer())
+
+
+def _load(builder: Any, place: Any) -> Any:
+    value = builder.load(place)
+    value.align = 8
+    return value
+
+
+def _store(builder: Any, value: Any, place: Any) -> None:
+    builder.store(value, place).align = 8
