@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeVar, cast
 
 import numba
 
-__all__ = ["helper", "inlined", "kernel", "parallel_kernel"]
+__all__ = ["helper", "inlined", "kernel", "threaded_kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -40,7 +40,8 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
     return cast(Callable[P, T], compiled)
 
 
-def parallel_kernel(function: Callable[P, T]) -> Callable[P, T]:
-    """Compile a kernel whose ``numba.prange`` loops run on all cores."""
-    compiled = numba.njit(cache=True, error_model="numpy", parallel=True, nogil=True)(function)
-    return cast(Callable[P, T], compiled)
+def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
+    return cast(
+        Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    )

@@ -23,7 +23,7 @@ from numba.np import arrayobj
 
 from surefix.types import FloatArray
 
-__all__ = ["ONE", "Size", "add_row", "clear_row", "copy_row", "scratch", "size_of", "width"]
+__all__ = ["ONE", "Size", "add_row", "clear_row", "copy_row", "part", "scratch", "size_of", "width"]
 
 Size: TypeAlias = tuple[None, ...] | int
 """A size known to the compiler, or a plain number."""
@@ -58,6 +58,15 @@ def scratch(rows: Size, columns: Size) -> FloatArray:
     return np.empty((width(rows), width(columns)))
 
 
+def part(A: FloatArray, start: int, rows: Size, columns: Size) -> FloatArray:
+    """Matrix (rows, columns) that begins at number ``start`` of a C-contiguous array: a view.
+
+    The array must outlive it, so it is not to be returned.
+    """
+    n, m = width(rows), width(columns)
+    return A.reshape(-1)[start : start + n * m].reshape(n, m)
+
+
 def add_row(A: FloatArray, i: int, factor: float, B: FloatArray, k: int, size: Size) -> None:
     """``A[i] += factor · B[k]``."""
     A[i] += factor * B[k]
@@ -73,7 +82,7 @@ def clear_row(A: FloatArray, i: int, size: Size) -> None:
     A[i] = 0.0
 
 
-# What follows teaches the compiler these five functions. They are built in, not overloaded, since an
+# What follows teaches the compiler these six functions. They are built in, not overloaded, since an
 # overload is a function of its own to compile for each kind of its arguments.
 
 _MATRIX = types.Array(types.float64, 2, "C")
@@ -87,6 +96,11 @@ def _type_width(_: Any) -> Any:
 @type_callable(scratch)  # type: ignore[untyped-decorator]
 def _type_scratch(_: Any) -> Any:
     return lambda rows, columns: _MATRIX
+
+
+@type_callable(part)  # type: ignore[untyped-decorator]
+def _type_part(_: Any) -> Any:
+    return lambda A, start, rows, columns: _MATRIX
 
 
 @type_callable(add_row)  # type: ignore[untyped-decorator]
@@ -110,19 +124,34 @@ def _width(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return _number(context, builder, signature.args[0], args[0])
 
 
+@lower_builtin(part, *([types.Any] * 4))  # type: ignore[untyped-decorator]
+def _part(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, start, rows, columns = signature.args
+    data = arrayobj.make_array(a)(context, builder, args[0]).data
+    at = builder.gep(data, [context.cast(builder, args[1], start, types.intp)])
+    n, m = (_number(context, builder, *each) for each in ((rows, args[2]), (columns, args[3])))
+    return _borrowed(context, builder, at, n, m)
+
+
 @lower_builtin(scratch, types.BaseTuple, types.BaseTuple)  # type: ignore[untyped-decorator]
 def _scratch_on_stack(context: Any, builder: Any, signature: Any, _args: Any) -> Any:
     n, m = (len(each) for each in signature.args)
     data = cgutils.alloca_once(builder, ir.DoubleType(), size=n * m)
     data.align = 64
+    number = context.get_constant
+    return _borrowed(context, builder, data, number(types.intp, n), number(types.intp, m))
+
+
+def _borrowed(context: Any, builder: Any, data: Any, n: Any, m: Any) -> Any:
+    """Array (n, m) of numbers that somebody else owns."""
     array = arrayobj.make_array(_MATRIX)(context, builder)
-    count = [context.get_constant(types.intp, each) for each in (n, m, 8 * m, 8)]
+    item = context.get_constant(types.intp, 8)
     arrayobj.populate_array(
         array,
         data=data,
-        shape=cgutils.pack_array(builder, count[:2]),
-        strides=cgutils.pack_array(builder, count[2:]),
-        itemsize=count[3],
+        shape=cgutils.pack_array(builder, [n, m]),
+        strides=cgutils.pack_array(builder, [builder.mul(m, item), item]),
+        itemsize=item,
         meminfo=None,
     )
     return array._getvalue()

@@ -20,6 +20,10 @@ A constant velocity seen with noise, in a series and as a stream:
 
 from __future__ import annotations
 
+import itertools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -27,13 +31,14 @@ from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
 from surefix.filters.kalman import Gaussian, Spread, gaussian
-from surefix.filters.linear_step import LinearModel, run_many, run_series, step
+from surefix.filters.linear_step import LinearModel, run, step
 from surefix.robust.loss import Loss, loss_named
 from surefix.rows import Size, size_of
 from surefix.types import FloatArray
 
 __all__ = ["LinearTrack", "StreamModel", "advance", "filter_linear", "stacked", "stream_model"]
 
+_SLICES = 4  # pieces of work a core, so that none waits for another
 _EXTREME = 1e-9  # of the largest variance: how far below 0 rounding may bring an eigenvalue
 
 
@@ -111,24 +116,34 @@ def filter_linear(
             f"a state of shapes {x.mean.shape} and {x.factor.shape}",
             f"({n},) and ({n}, {n}), with a leading {tuple(series)} or not",
         )
-    model = _linear_model(F, Q, H, R, n, m, N)
-    mean, covariance = np.empty((*series, N, n)), np.empty((*series, N * n, n))
-    start = np.ascontiguousarray(np.broadcast_to(x.mean, (*series, n)), np.float64)
-    first = np.ascontiguousarray(np.broadcast_to(x.covariance, (*series, n, n)), np.float64)
-    found = tuple(np.empty(seen.shape) for _ in range(3))
-    run = run_many if series else run_series
-    run(
-        model,
-        _usable(loss),
-        spread == "noise",
-        start[..., None, :],
-        first,
-        seen,
-        mean,
-        covariance,
-        *found,
+    model, by_noise = _linear_model(F, Q, H, R, n, m, N), spread == "noise"
+    T = series[0] if series else 1
+    out = (
+        np.empty((T, N, n)),
+        np.empty((T, N * n, n)),
+        *(np.empty((T, N, m)) for _ in range(3)),
     )
-    return LinearTrack(mean, covariance.reshape(*series, N, n, n), *found)
+    arrays = (
+        np.ascontiguousarray(np.broadcast_to(x.mean, (*series, n)), np.float64).reshape(T, 1, n),
+        np.ascontiguousarray(np.broadcast_to(x.covariance, (*series, n, n))).reshape(T, n, n),
+        seen.reshape(T, N, m),
+        *out,
+    )
+    usable = _usable(loss)
+    _on_all_cores(T, lambda some: run(model, usable, by_noise, *(each[some] for each in arrays)))
+    mean, covariance, *found = (each.reshape(*series, -1, *each.shape[2:]) for each in out)
+    return LinearTrack(mean, covariance.reshape(*mean.shape, n), *found)
+
+
+def _on_all_cores(count: int, work: Callable[[slice], None]) -> None:
+    """Do ``count`` pieces of work in slices, on as many threads as there are cores."""
+    cores = min(os.cpu_count() or 1, count)
+    if cores < 2:
+        work(slice(0, count))
+        return
+    ends = np.linspace(0, count, min(_SLICES * cores, count) + 1).astype(np.int64)
+    with ThreadPoolExecutor(cores) as pool:
+        list(pool.map(work, (slice(a, b) for a, b in itertools.pairwise(ends.tolist()))))
 
 
 def stream_model(
@@ -178,7 +193,10 @@ def advance(
     state, seen
         (n + 1, n), and (3, m): residuals, squared innovations over their variance, weights.
     """
-    return step(model.packed, model.states, model.components, state, z)
+    packed, states, components = model
+    after, seen = np.empty(state.shape), np.empty((3, len(z)))
+    step(packed, states, components, state, z, after, seen)
+    return after, seen
 
 
 def _usable(loss: Loss | None) -> Loss:
@@ -202,9 +220,12 @@ def _linear_model(
     step_, noise, seen, error = stacks
     _check(noise, "Q", _EXTREME)
     _check(error, "R", 0.0)
-    turned = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (step_, seen))
-    F_T, H_T = turned
-    return LinearModel(step_, F_T, noise, seen, H_T, error, size_of(n), size_of(m))
+    wanted = (step_, np.swapaxes(step_, 1, 2), noise, seen, np.swapaxes(seen, 1, 2), error)
+    return LinearModel(
+        *(np.ascontiguousarray(each).reshape(-1, each.shape[2]) for each in wanted),
+        size_of(n),
+        size_of(m),
+    )
 
 
 def _check(stack: FloatArray, name: str, tolerance: float) -> None:

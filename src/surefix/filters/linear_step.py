@@ -14,32 +14,31 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from surefix.jit import inlined, kernel, parallel_kernel
+from surefix.jit import inlined, kernel, threaded_kernel
 from surefix.robust.loss import Loss, weight
-from surefix.rows import ONE, Size, add_row, clear_row, copy_row, scratch, width
+from surefix.rows import ONE, Size, add_row, clear_row, copy_row, part, scratch, width
 from surefix.types import FloatArray
 
-__all__ = ["LinearModel", "run_many", "run_series", "step"]
+__all__ = ["LinearModel", "run", "step"]
 
 _FALL = 1e4  # ratio of S to R̄ above which the short form would lose more than four digits
 
 
 class LinearModel(NamedTuple):
-    """``x' = F x + w``, ``z = H x + v``; made by `surefix.filters.linear.linear_model`.
+    """``x' = F x + w``, ``z = H x + v``.
 
-    Each matrix is a stack: of one for all epochs, or of one for each.
+    Matrices stand one below the other: k is 1 for the same at all epochs, or N for one for each.
 
     Parameters
     ----------
     F, F_T, Q
-        (1 or N, n, n) transition, its transpose, and process noise.
+        (k·n, n) transition, its transpose, and process noise.
     H, H_T
-        (1 or N, m, n) and (1 or N, n, m).
+        (k·m, n) and (k·n, m).
     R
-        (1 or N, m, m).
+        (k·m, m).
     states, components
         Sizes n and m for the compiler, see `surefix.rows`.
     """
@@ -258,15 +257,14 @@ def _series(
         scratch(components, components),
         scratch(components, components),
     )
-    F, F_T, Q = model.F.reshape(-1, n), model.F_T.reshape(-1, n), model.Q.reshape(-1, n)
-    H, H_T, R = model.H.reshape(-1, n), model.H_T.reshape(-1, m), model.R.reshape(-1, m)
-    f_step, q_step = int(len(model.F) > 1), int(len(model.Q) > 1)
-    h_step, r_step = int(len(model.H) > 1), int(len(model.R) > 1)
+    F, F_T, Q, H, H_T, R = model.F, model.F_T, model.Q, model.H, model.H_T, model.R
+    f_step, q_step = n * (F.shape[0] > n), n * (Q.shape[0] > n)
+    h_step, r_step = 1 * (H.shape[0] > m), m * (R.shape[0] > m)
     copy_row(x, 0, start, 0, states)
     for i in range(n):
         copy_row(P, i, first, i, states)
     for k in range(z.shape[0]):
-        f, q, h, r = f_step * k * n, q_step * k * n, h_step * k, r_step * k * m
+        f, q, h, r = f_step * k, q_step * k, h_step * k, r_step * k
         _predict(x, P, y, A, F, F_T, f, Q, q, states)
         copy_row(e, 0, z, k, components)
         _innovate(x, P, e, B, S, H, H_T, h, R, r, states, components)
@@ -289,8 +287,8 @@ def _series(
             copy_row(covariance, k * n + i, P, i, states)
 
 
-@kernel
-def run_series(
+@threaded_kernel
+def run(
     model: LinearModel,
     loss: Loss,
     by_noise: bool,
@@ -303,26 +301,8 @@ def run_series(
     nis: FloatArray,
     weights: FloatArray,
 ) -> None:
-    """One series; the arrays as for `_series`."""
-    _series(model, loss, by_noise, start, first, z, mean, covariance, residual, nis, weights)
-
-
-@parallel_kernel
-def run_many(
-    model: LinearModel,
-    loss: Loss,
-    by_noise: bool,
-    start: FloatArray,
-    first: FloatArray,
-    z: FloatArray,
-    mean: FloatArray,
-    covariance: FloatArray,
-    residual: FloatArray,
-    nis: FloatArray,
-    weights: FloatArray,
-) -> None:
-    """Many series, a leading axis on all arrays, on all cores."""
-    for t in numba.prange(z.shape[0]):
+    """Filter series one after the other; a leading axis on all arrays of `_series`."""
+    for t in range(z.shape[0]):
         _series(
             model,
             loss,
@@ -340,39 +320,43 @@ def run_many(
 
 @kernel
 def step(
-    packed: FloatArray, states: Size, components: Size, state: FloatArray, z: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """One epoch; for `surefix.filters.linear.advance`, which says what comes in and out.
+    packed: FloatArray,
+    states: Size,
+    components: Size,
+    state: FloatArray,
+    z: FloatArray,
+    after: FloatArray,
+    seen: FloatArray,
+) -> None:
+    """One epoch; for `surefix.filters.linear.advance`, which says what goes in and out.
 
-    ``packed`` holds F, Fᵀ, Q, H, Hᵀ, R, and code, k₀ and k₁ of the loss: one array is unpacked
-    sooner than nine.
+    ``packed`` holds F, Fᵀ, Q, H, Hᵀ, R, and code, k₀ and k₁ of the loss: a call with one array is
+    sooner than with nine, and results that the caller made are sooner than new ones.
     """
     n, m = width(states), width(components)
     a, b, c = n * n, 3 * n * n, 3 * n * n + 2 * n * m
+    d = c + m * m
     model = LinearModel(
-        packed[:a].reshape(1, n, n),
-        packed[a : 2 * a].reshape(1, n, n),
-        packed[2 * a : b].reshape(1, n, n),
-        packed[b : b + n * m].reshape(1, m, n),
-        packed[b + n * m : c].reshape(1, n, m),
-        packed[c : c + m * m].reshape(1, m, m),
+        part(packed, 0, states, states),
+        part(packed, a, states, states),
+        part(packed, 2 * a, states, states),
+        part(packed, b, components, states),
+        part(packed, b + n * m, states, components),
+        part(packed, c, components, components),
         states,
         components,
     )
-    d = c + m * m
     loss = Loss(int(packed[d]), packed[d + 1], packed[d + 2], 1.0, 1.0, 0)
-    after, seen = np.empty((n + 1, n)), np.empty((3, m))
     _series(
         model,
         loss,
         False,
-        state[:1],
-        state[1:],
-        z.reshape(1, m),
-        after[:1],
-        after[1:],
-        seen[:1],
-        seen[1:2],
-        seen[2:],
+        part(state, 0, ONE, states),
+        part(state, n, states, states),
+        part(z, 0, ONE, components),
+        part(after, 0, ONE, states),
+        part(after, n, states, states),
+        part(seen, 0, ONE, components),
+        part(seen, m, ONE, components),
+        part(seen, 2 * m, ONE, components),
     )
-    return after, seen
