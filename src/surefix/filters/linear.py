@@ -36,7 +36,7 @@ from surefix.robust.loss import Loss, loss_named
 from surefix.rows import Size, size_of
 from surefix.types import FloatArray
 
-__all__ = ["LinearTrack", "StreamModel", "advance", "filter_linear", "stacked", "stream_model"]
+__all__ = ["LinearTrack", "StreamModel", "advance", "filter_linear", "linear_model", "stacked", "stream_model"]
 
 _SLICES = 4  # pieces of work a core, so that none waits for another
 _EXTREME = 1e-9  # of the largest variance: how far below 0 rounding may bring an eigenvalue
@@ -116,7 +116,7 @@ def filter_linear(
             f"a state of shapes {x.mean.shape} and {x.factor.shape}",
             f"({n},) and ({n}, {n}), with a leading {tuple(series)} or not",
         )
-    model, by_noise = _linear_model(F, Q, H, R, n, m, N), spread == "noise"
+    model, by_noise = linear_model(F, Q, H, R, (n, m, N)), spread == "noise"
     T = series[0] if series else 1
     out = (
         np.empty((T, N, n)),
@@ -162,7 +162,7 @@ def stream_model(
         As `filter_linear`.
     """
     m, n = np.shape(H) if np.ndim(H) == 2 else (0, 0)
-    model, loss = _linear_model(F, Q, H, R, n, m, 1), _usable(loss)
+    model, loss = linear_model(F, Q, H, R, (n, m, 1)), _usable(loss)
     parts = [np.ravel(each) for each in model[:6]]
     return StreamModel(
         np.concatenate([*parts, [loss.code, loss.k0, loss.k1]]), model.states, model.components
@@ -206,10 +206,24 @@ def _usable(loss: Loss | None) -> Loss:
     return loss
 
 
-def _linear_model(
-    F: ArrayLike, Q: ArrayLike, H: ArrayLike, R: ArrayLike, n: int, m: int, N: int
+def linear_model(
+    F: ArrayLike, Q: ArrayLike, H: ArrayLike, R: ArrayLike, sizes: tuple[int, int, int]
 ) -> LinearModel:
-    """Stacks of one matrix, or of one for each of N epochs."""
+    """Check the matrices of a linear model and lay them out for the kernels.
+
+    Parameters
+    ----------
+    F, Q, H, R
+        As for `filter_linear`.
+    sizes
+        Numbers of states n, of components m, and of epochs N.
+
+    Raises
+    ------
+    OptionsError
+        Q or R is no covariance, or a shape does not agree.
+    """
+    n, m, N = sizes
     shapes = {"F": (n, n), "Q": (n, n), "H": (m, n), "R": (m, m)}
     stacks = []
     for given, (name, shape) in zip((F, Q, H, R), shapes.items(), strict=True):

@@ -21,7 +21,7 @@ from surefix.robust.loss import Loss, weight
 from surefix.rows import ONE, Size, add_row, clear_row, copy_row, part, scratch, width
 from surefix.types import FloatArray
 
-__all__ = ["LinearModel", "run", "step"]
+__all__ = ["LinearModel", "eliminate_rows", "predict_rows", "run", "step", "weigh_rows"]
 
 _FALL = 1e4  # ratio of S to R̄ above which the short form would lose more than four digits
 
@@ -54,7 +54,7 @@ class LinearModel(NamedTuple):
 
 
 @inlined
-def _predict(
+def predict_rows(
     x: FloatArray,
     P: FloatArray,
     y: FloatArray,
@@ -111,7 +111,7 @@ def _innovate(
 
 
 @inlined
-def _weigh(
+def weigh_rows(
     e: FloatArray,
     S: FloatArray,
     R: FloatArray,
@@ -150,7 +150,7 @@ def _weigh(
 
 
 @inlined
-def _eliminate(
+def eliminate_rows(
     x: FloatArray,
     e: FloatArray,
     B: FloatArray,
@@ -265,17 +265,17 @@ def _series(
         copy_row(P, i, first, i, states)
     for k in range(z.shape[0]):
         f, q, h, r = f_step * k, q_step * k, h_step * k, r_step * k
-        _predict(x, P, y, A, F, F_T, f, Q, q, states)
+        predict_rows(x, P, y, A, F, F_T, f, Q, q, states)
         copy_row(e, 0, z, k, components)
         _innovate(x, P, e, B, S, H, H_T, h, R, r, states, components)
         for c in range(m):
             residual[k, c] = e[0, c]
             nis[k, c] = e[0, c] * e[0, c] / S[c, c]
-        far = _weigh(e, S, R, r, used, root, loss, by_noise, components)
+        far = weigh_rows(e, S, R, r, used, root, loss, by_noise, components)
         for c in range(m):
             w = used[0, c] / (root[0, c] * root[0, c])
             weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
-        _eliminate(x, e, B, S, L, used, states, components)
+        eliminate_rows(x, e, B, S, L, used, states, components)
         if far:
             _joseph(P, A, B, L, used, root, H, h * m, R, r, states, components)
         else:

@@ -17,10 +17,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surefix.jit import helper, kernel
+from surefix.jit import helper, inlined, kernel
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["BEARING", "COMPONENT", "ELEVATION", "RANGE", "expected", "period_of", "sight"]
+__all__ = ["BEARING", "COMPONENT", "ELEVATION", "RANGE", "expected", "period_of", "sight", "value_of"]
 
 RANGE: Final = 0
 BEARING: Final = 1
@@ -68,6 +68,33 @@ def sight(kind: int, anchor: FloatArray, x: FloatArray, d: int, H: FloatArray) -
     H[1] = -up * north / (flat * distance * distance)
     H[2] = flat / (distance * distance)
     return math.atan2(up, flat)
+
+
+@inlined
+def value_of(kind: int, anchors: FloatArray, c: int, x: FloatArray, d: int) -> float:
+    """Value of a sight as `sight` gives it, without the Jacobian.
+
+    Parameters
+    ----------
+    kind
+        A code of this module.
+    anchors, c
+        (…, d) m, and which row is the anchor.
+    x
+        (1, n) state that begins with the position.
+    """
+    if kind >= COMPONENT:
+        i = kind - COMPONENT
+        return float(x[0, i] - anchors[c, i]) if i < d else float(x[0, i])
+    east = x[0, 0] - anchors[c, 0]
+    north = x[0, 1] - anchors[c, 1] if d > 1 else 0.0
+    up = x[0, 2] - anchors[c, 2] if d == 3 else 0.0
+    if kind == BEARING:
+        return math.atan2(east, north)
+    flat = east * east + north * north
+    if kind == RANGE:
+        return max(math.sqrt(flat + up * up), _TINY)
+    return math.atan2(up, max(math.sqrt(flat), _TINY))
 
 
 @helper
