@@ -39,6 +39,7 @@ from surefix.types import FloatArray
 __all__ = ["LinearTrack", "StreamModel", "advance", "filter_linear", "linear_model", "stacked", "stream_model"]
 
 _SLICES = 4  # pieces of work a core, so that none waits for another
+_ALIKE = 1e-9  # relative difference of what is called symmetric
 _EXTREME = 1e-9  # of the largest variance: how far below 0 rounding may bring an eigenvalue
 
 
@@ -244,8 +245,8 @@ def linear_model(
 
 def _check(stack: FloatArray, name: str, tolerance: float) -> None:
     """Refuse what is not finite, symmetric and positive (semi-)definite."""
-    known = bool(np.isfinite(stack).all())
-    if known and np.allclose(stack, np.swapaxes(stack, -1, -2), rtol=1e-9, atol=0.0):
+    turned = np.swapaxes(stack, -1, -2)
+    if np.isfinite(stack).all() and (np.abs(stack - turned) <= _ALIKE * np.abs(turned)).all():
         size = stack.shape[-1]
         largest = np.abs(np.einsum("kii->ki", stack)).max(axis=1, initial=0.0)
         slack = tolerance * np.where(largest > 0.0, largest, 1.0)

@@ -144,8 +144,13 @@ def weigh_rows(
             far = True
     if changed:
         for c in range(m):
+            if root[0, c] == 1.0:
+                continue
             for d in range(m):
-                S[c, d] += R[r + c, d] * (root[0, c] * root[0, d] - 1.0)
+                more = R[r + c, d] * (root[0, c] * root[0, d] - 1.0)
+                S[c, d] += more
+                if root[0, d] == 1.0:
+                    S[d, c] += more
     return far
 
 
