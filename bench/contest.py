@@ -1,4 +1,4 @@
-"""Contestants side by side: every round runs each of them once, so that all see the same machine."""
+"""Contestants side by side: every round runs each once, so that all see the same machine."""
 
 from __future__ import annotations
 

@@ -164,9 +164,7 @@ def medians(window: int) -> Contest:
     from scipy.ndimage import median_filter
 
     run = partial(median_filter, x, size=window)
-    contest.contestants.append(
-        Contestant("scipy.ndimage", samples, run, partial(_inside, window))
-    )
+    contest.contestants.append(Contestant("scipy.ndimage", samples, run, partial(_inside, window)))
     return contest
 
 
@@ -232,9 +230,7 @@ def track_filter() -> Contest:
     contest = Contest("surefix clean --method igg3, its filter", "µs an epoch", 1e6, [])
     contest.contestants = [
         Contestant("surefix", EPOCHS, forward),
-        Contestant(
-            "its smoother", EPOCHS, lambda: smooth(motion, recovery, epochs.time, filtered)
-        ),
+        Contestant("its smoother", EPOCHS, lambda: smooth(motion, recovery, epochs.time, filtered)),
     ]
     return contest
 
@@ -317,9 +313,7 @@ def _add(
     except (ImportError, FileNotFoundError) as error:
         contest.skipped[name] = str(error)
         return
-    contest.contestants.append(
-        Contestant(name, len(some.z), run, None if another else _moments)
-    )
+    contest.contestants.append(Contestant(name, len(some.z), run, None if another else _moments))
 
 
 def _moments(found: object) -> np.ndarray:

@@ -87,7 +87,7 @@ def stonesoup(problem: Linear) -> Run:
     )
     sensor = LinearGaussian(n, tuple(range(m)), problem.R)
     predictor, updater = KalmanPredictor(motion), KalmanUpdater(sensor)
-    begin = datetime(2026, 1, 1)  # noqa: DTZ001
+    begin = datetime(2026, 1, 1)
 
     def run() -> tuple[np.ndarray, np.ndarray]:
         state = GaussianState(problem.mean[:, None], problem.covariance, timestamp=begin)

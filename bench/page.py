@@ -17,24 +17,27 @@ FONT = "font-family='system-ui, Segoe UI, Helvetica, Arial, sans-serif'"
 
 HEAD = """# Benchmarks
 
-Made by `make bench`, which runs everything side by side in one process: each round times every contestant in
-turn, so that all see the same machine. A cost is the median of the rounds with its quartiles; ratios are medians of
-ratios within a round. *Differs* is the largest difference of any figure from ours, as a share of the largest figure.
+Made by `make bench`, which runs everything side by side in one process: each round times every
+contestant in turn, so that all see the same machine. A cost is the median of the rounds with its
+quartiles; ratios are medians of ratios within a round. *Differs* is the largest difference of any
+figure from ours, as a share of the largest figure.
 
 """
 
 NOTES = """
 ## What is compared
 
-- **Kalman filter**: means and covariances of all epochs. C is `bench/kalman.c`, the conventional covariance form
-  with sizes known to the compiler, `gcc -O3 -march=native`. Ours also gives innovations and their squares. statsmodels
-  takes one component at a time and is exact at every epoch (`tolerance=0`). JAX is compiled and warm, in double
-  precision; dynamax adds a little to the diagonal of what it inverts, which is its difference.
-- **IGG3**: observations with 5 % wild values. FilterPy with a gate is another method; its figures are not compared.
+- **Kalman filter**: means and covariances of all epochs. C is `bench/kalman.c`, the conventional
+  covariance form with sizes known to the compiler, `gcc -O3 -march=native`. Ours also gives
+  innovations and their squares. statsmodels takes one component at a time and is exact at every
+  epoch (`tolerance=0`). JAX is compiled and warm, in double precision; dynamax adds a little to the
+  diagonal of what it inverts, which is its difference.
+- **IGG3**: observations with 5 % wild values. FilterPy with a gate is another method, and its
+  figures are not compared.
 - **One call an epoch**: state and covariance come back to Python each time.
 - **Running median**: normal noise, compared where the whole window lies inside the series.
 - **Hampel**: the peer computes in single precision.
-- **16 hypotheses** and the product's own filter have no peer that does the same.
+- **Hypotheses** and the filter and smoother of `surefix clean` have no peer that does the same.
 """
 
 
@@ -48,11 +51,11 @@ def aims_of(contest: Contest, standings: list[Standing]) -> list[tuple[str, bool
             continue
         factor = min(each.times_ours for each in rivals)
         who = "the fastest peer" if name == "fastest" else name
-        if share > 1.0:
-            found.append((f"at most {share:g} × {who}: {1.0 / factor:.2f} ×", 1.0 / factor <= share))
+        if share >= 1.0:
+            text = f"at most {share:g} × {who}: {1.0 / factor:.2f} ×"
         else:
-            wanted = 1.0 / share
-            found.append((f"{wanted:,.0f} × sooner than {who}: {_number(factor)} ×", factor >= wanted))
+            text = f"{1.0 / share:,.0f} × sooner than {who}: {_number(factor)} ×"
+        found.append((text, 1.0 / factor <= share))
     if contest.limit is not None:
         text = f"at most {contest.limit:g} {contest.unit}: {_number(ours.cost)}"
         found.append((text, ours.cost <= contest.limit))

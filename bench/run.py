@@ -96,7 +96,9 @@ def record(about: dict[str, str], results: list[tuple[Contest, list[Standing]]])
             "contest": contest.name,
             "unit": contest.unit,
             "standings": [vars(each) for each in standings],
-            "aims": [{"aim": aim, "reached": reached} for aim, reached in aims_of(contest, standings)],
+            "aims": [
+                {"aim": aim, "reached": reached} for aim, reached in aims_of(contest, standings)
+            ],
             "skipped": contest.skipped,
         }
         for contest, standings in results

@@ -42,6 +42,4 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
 
 def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
-    return cast(
-        Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-    )
+    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function))

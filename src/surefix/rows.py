@@ -88,43 +88,43 @@ def clear_row(A: FloatArray, i: int, size: Size) -> None:
 _MATRIX = types.Array(types.float64, 2, "C")
 
 
-@type_callable(width)  # type: ignore[untyped-decorator]
+@type_callable(width)
 def _type_width(_: Any) -> Any:
     return lambda size: types.intp
 
 
-@type_callable(scratch)  # type: ignore[untyped-decorator]
+@type_callable(scratch)
 def _type_scratch(_: Any) -> Any:
     return lambda rows, columns: _MATRIX
 
 
-@type_callable(part)  # type: ignore[untyped-decorator]
+@type_callable(part)
 def _type_part(_: Any) -> Any:
     return lambda A, start, rows, columns: _MATRIX
 
 
-@type_callable(add_row)  # type: ignore[untyped-decorator]
+@type_callable(add_row)
 def _type_add_row(_: Any) -> Any:
     return lambda A, i, factor, B, k, size: types.void
 
 
-@type_callable(copy_row)  # type: ignore[untyped-decorator]
+@type_callable(copy_row)
 def _type_copy_row(_: Any) -> Any:
     return lambda A, i, B, k, size: types.void
 
 
-@type_callable(clear_row)  # type: ignore[untyped-decorator]
+@type_callable(clear_row)
 def _type_clear_row(_: Any) -> Any:
     return lambda A, i, size: types.void
 
 
-@lower_builtin(width, types.BaseTuple)  # type: ignore[untyped-decorator]
-@lower_builtin(width, types.Integer)  # type: ignore[untyped-decorator]
+@lower_builtin(width, types.BaseTuple)
+@lower_builtin(width, types.Integer)
 def _width(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return _number(context, builder, signature.args[0], args[0])
 
 
-@lower_builtin(part, *([types.Any] * 4))  # type: ignore[untyped-decorator]
+@lower_builtin(part, *([types.Any] * 4))
 def _part(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     a, start, rows, columns = signature.args
     data = arrayobj.make_array(a)(context, builder, args[0]).data
@@ -133,7 +133,7 @@ def _part(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return _borrowed(context, builder, at, n, m)
 
 
-@lower_builtin(scratch, types.BaseTuple, types.BaseTuple)  # type: ignore[untyped-decorator]
+@lower_builtin(scratch, types.BaseTuple, types.BaseTuple)
 def _scratch_on_stack(context: Any, builder: Any, signature: Any, _args: Any) -> Any:
     n, m = (len(each) for each in signature.args)
     data = cgutils.alloca_once(builder, ir.DoubleType(), size=n * m)
@@ -157,14 +157,16 @@ def _borrowed(context: Any, builder: Any, data: Any, n: Any, m: Any) -> Any:
     return array._getvalue()
 
 
-@lower_builtin(scratch, types.Any, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(scratch, types.Any, types.Any)
 def _scratch_on_heap(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     size = [_number(context, builder, *each) for each in zip(signature.args, args, strict=True)]
     plain = _MATRIX(types.intp, types.intp)
-    return context.compile_internal(builder, lambda rows, columns: np.empty((rows, columns)), plain, size)
+    return context.compile_internal(
+        builder, lambda rows, columns: np.empty((rows, columns)), plain, size
+    )
 
 
-@lower_builtin(add_row, *([types.Any] * 6))  # type: ignore[untyped-decorator]
+@lower_builtin(add_row, *([types.Any] * 6))
 def _add_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     a, i, factor, b, k, size = signature.args
     target = _start(context, builder, a, args[0], i, args[1], size, args[5])
@@ -189,7 +191,7 @@ def _add_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-@lower_builtin(copy_row, *([types.Any] * 5))  # type: ignore[untyped-decorator]
+@lower_builtin(copy_row, *([types.Any] * 5))
 def _copy_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     a, i, b, k, size = signature.args
     target = _start(context, builder, a, args[0], i, args[1], size, args[4])
@@ -204,7 +206,7 @@ def _copy_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-@lower_builtin(clear_row, *([types.Any] * 3))  # type: ignore[untyped-decorator]
+@lower_builtin(clear_row, *([types.Any] * 3))
 def _clear_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     a, i, size = signature.args
     target = _start(context, builder, a, args[0], i, args[1], size, args[2])

@@ -4,9 +4,9 @@ Both give the medians of the known ones of w neighbouring samples, for every pla
 neighbours are given; NaN is missing.
 
 **Narrow** windows are sorted by comparing and exchanging in a fixed order, which needs no branches,
-so many windows are sorted at once in vector registers. **Wide** ones go by ranks: a stretch of a few
-windows' length is sorted once, and the window is then a row of marks in the order of rank, along
-which the median moves by a mark or two when a sample enters and another leaves. Source of the
+so many windows are sorted at once in vector registers. **Wide** ones go by ranks: a stretch of a
+few windows' length is sorted once, and the window is then a row of marks in the order of rank,
+along which the median moves by a mark or two when a sample enters and another leaves. Source of the
 second idea: Suomela, Median filtering is equivalent to sorting, 2014, who links ranks in lists.
 """
 

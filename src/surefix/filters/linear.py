@@ -2,12 +2,14 @@
 
 For models that `surefix.filters.track` does not know: any F, Q and H, which may change from epoch
 to epoch, and correlated observations. The state is carried as a covariance, and by Joseph's form
-where digits would be lost (`surefix.filters.linear_step`); `surefix.filters.kalman` has the steps
-in square-root form.
+where digits would be lost (`surefix.filters.linear_step`): of the 16 digits those remain by which
+the variances of the states do not differ. Beyond 10¹² take the steps in square-root form of
+`surefix.filters.kalman`, which keep half of the rest.
 
 A constant velocity seen with noise, in a series and as a stream:
 
 >>> F, Q = [[1.0, 1.0], [0.0, 1.0]], [[0.003, 0.005], [0.005, 0.01]]
+>>> from surefix.filters.kalman import gaussian
 >>> begin, z = gaussian([0.0, 0.0], np.diag([1.0, 4.0])), np.array([[1.2], [np.nan], [2.9]])
 >>> filter_linear(begin, z, F, Q, [[1.0, 0.0]], [[0.25]]).mean.round(3).tolist()
 [[1.143, 0.914], [2.057, 0.914], [2.872, 0.889]]
@@ -30,13 +32,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
-from surefix.filters.kalman import Gaussian, Spread, gaussian
+from surefix.filters.kalman import Gaussian, Spread
 from surefix.filters.linear_step import LinearModel, run, step
 from surefix.robust.loss import Loss, loss_named
 from surefix.rows import Size, size_of
 from surefix.types import FloatArray
 
-__all__ = ["LinearTrack", "StreamModel", "advance", "filter_linear", "linear_model", "stacked", "stream_model"]
+__all__ = [
+    "LinearTrack",
+    "StreamModel",
+    "advance",
+    "filter_linear",
+    "linear_model",
+    "stacked",
+    "stream_model",
+]
 
 _SLICES = 4  # pieces of work a core, so that none waits for another
 _ALIKE = 1e-9  # relative difference of what is called symmetric
@@ -175,9 +185,7 @@ def stacked(x: Gaussian) -> FloatArray:
     return np.concatenate((x.mean[None], x.covariance))
 
 
-def advance(
-    model: StreamModel, state: FloatArray, z: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def advance(model: StreamModel, state: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Predict and update once, for streams; the same numbers as `filter_linear` to the last bit.
 
     Parameters
@@ -236,11 +244,10 @@ def linear_model(
     _check(noise, "Q", _EXTREME)
     _check(error, "R", 0.0)
     wanted = (step_, np.swapaxes(step_, 1, 2), noise, seen, np.swapaxes(seen, 1, 2), error)
-    return LinearModel(
-        *(np.ascontiguousarray(each).reshape(-1, each.shape[2]) for each in wanted),
-        size_of(n),
-        size_of(m),
+    f, f_t, q, h, h_t, r = (
+        np.ascontiguousarray(each).reshape(-1, each.shape[2]) for each in wanted
     )
+    return LinearModel(f, f_t, q, h, h_t, r, size_of(n), size_of(m))
 
 
 def _check(stack: FloatArray, name: str, tolerance: float) -> None:

@@ -20,7 +20,16 @@ from numpy.typing import ArrayLike
 from surefix.jit import helper, inlined, kernel
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["BEARING", "COMPONENT", "ELEVATION", "RANGE", "expected", "period_of", "sight", "value_of"]
+__all__ = [
+    "BEARING",
+    "COMPONENT",
+    "ELEVATION",
+    "RANGE",
+    "expected",
+    "period_of",
+    "sight",
+    "value_of",
+]
 
 RANGE: Final = 0
 BEARING: Final = 1
