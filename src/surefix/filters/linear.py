@@ -12,12 +12,12 @@ A constant velocity seen with noise, in a series and as a stream:
 >>> from surefix.filters.kalman import gaussian
 >>> begin, z = gaussian([0.0, 0.0], np.diag([1.0, 4.0])), np.array([[1.2], [np.nan], [2.9]])
 >>> filter_linear(begin, z, F, Q, [[1.0, 0.0]], [[0.25]]).mean.round(3).tolist()
-[[1.143, 0.914], [2.057, 0.914], [2.872, 0.889]]
+[[1.143, 0.915], [2.058, 0.915], [2.904, 0.885]]
 >>> model, state = stream_model(F, Q, [[1.0, 0.0]], [[0.25]]), stacked(begin)
 >>> for row in z:
 ...     state, seen = advance(model, state, row)
 >>> state[0].round(3).tolist()
-[2.872, 0.889]
+[2.904, 0.885]
 """
 
 from __future__ import annotations

@@ -274,8 +274,9 @@ def _series(
         copy_row(e, 0, z, k, components)
         _innovate(x, P, e, B, S, H, H_T, h, R, r, states, components)
         for c in range(m):
-            residual[k, c] = e[0, c]
-            nis[k, c] = e[0, c] * e[0, c] / S[c, c]
+            seen = e[0, c] if abs(e[0, c]) < np.inf else np.nan
+            residual[k, c] = seen
+            nis[k, c] = seen * seen / S[c, c]
         far = weigh_rows(e, S, R, r, used, root, loss, by_noise, components)
         for c in range(m):
             w = used[0, c] / (root[0, c] * root[0, c])

@@ -208,8 +208,9 @@ def _run(
                 add_row(S, c, share * down[j, c], down, j, components)
                 add_row(B, c, 0.5 / gamma * (up[j, c] - down[j, c]), L, j, states)
             e[0, c] = _turned(z[k, c] - centre[0, c] - shift[0, c], kind[c])
-            residual[k, c] = e[0, c]
-            nis[k, c] = e[0, c] * e[0, c] / S[c, c]
+            seen = e[0, c] if abs(e[0, c]) < np.inf else np.nan
+            residual[k, c] = seen
+            nis[k, c] = seen * seen / S[c, c]
         weigh_rows(e, S, R, r, used, root, loss, False, components)
         for c in range(m):
             w = used[0, c] / (root[0, c] * root[0, c])
