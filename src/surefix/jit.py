@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar, cast
 
 import numba
+from numba.extending import register_jitable
 
 __all__ = ["helper", "inlined", "kernel", "threaded_kernel"]
 
@@ -36,8 +37,14 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
     Sizes that the caller knows (see `surefix.rows`) are then known inside, and no array is counted
     on the way. A product and a sum may become one instruction.
     """
-    compiled = numba.njit(error_model="numpy", forceinline=True, fastmath={"contract"})(function)
-    return cast(Callable[P, T], compiled)
+    part = register_jitable(
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract"},
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )
+    return cast(Callable[P, T], part(function))
 
 
 def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
