@@ -29,7 +29,7 @@ from surefix.robust.loss import loss_named
 
 __all__ = ["all_contests"]
 
-EPOCHS = 2000
+EPOCHS = 5000
 FEW = 100  # epochs for those that take long
 SAMPLES = 20_000
 WIDEST = 30_001

@@ -10,6 +10,7 @@ Matrices are C-contiguous and exactly as wide as the size says; rows are ``A[i, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeAlias
@@ -26,13 +27,17 @@ from surefix.types import FloatArray
 __all__ = [
     "ONE",
     "Size",
+    "add_product",
     "add_row",
+    "angle_row",
     "clear_row",
     "copy_row",
     "dot_rows",
     "part",
+    "root_row",
     "scratch",
     "size_of",
+    "turn_row",
     "width",
 ]
 
@@ -44,6 +49,19 @@ ONE: Size = (None,)
 
 _LARGEST = 18  # twice the largest state: a factor beside that of its noise
 
+
+def _by_chebyshev(degree: int) -> tuple[float, ...]:
+    """Powers of z = t² that make ``atan(t)/t`` for t up to tan(π/8)."""
+    reach = math.tan(math.pi / 8.0) ** 2
+
+    def ratio(z: FloatArray) -> FloatArray:
+        return np.arctan(np.sqrt(z)) / np.sqrt(z)
+
+    found = np.polynomial.Chebyshev.interpolate(ratio, degree, domain=[0.0, reach])
+    return tuple(found.convert(kind=np.polynomial.Polynomial).coef.tolist())
+
+
+_ARCTANGENT = _by_chebyshev(11)
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction
 
 
@@ -98,6 +116,30 @@ def dot_rows(A: FloatArray, i: int, B: FloatArray, k: int, size: Size) -> float:
     return float(A[i] @ B[k])
 
 
+def add_product(
+    A: FloatArray, i: int, B: FloatArray, j: int, C: FloatArray, k: int, size: Size
+) -> None:
+    """``A[i] += B[j] · C[k]``, number by number."""
+    A[i] += B[j] * C[k]
+
+
+def root_row(A: FloatArray, i: int, size: Size) -> None:
+    """``A[i] = √A[i]``."""
+    A[i] = np.sqrt(A[i])
+
+
+def angle_row(
+    A: FloatArray, i: int, Y: FloatArray, j: int, X: FloatArray, k: int, size: Size
+) -> None:
+    """``A[i] = atan2(Y[j], X[k])`` to two units of the last place; 0 where both are 0."""
+    A[i] = np.arctan2(Y[j], X[k])
+
+
+def turn_row(A: FloatArray, i: int, period: float, size: Size) -> None:
+    """Bring ``A[i]`` to within half a period of 0."""
+    A[i] -= period * np.rint(A[i] / period)
+
+
 # What follows teaches the compiler these functions. They are built in, not overloaded, since an
 # overload is a function of its own to compile for each kind of its arguments.
 
@@ -137,6 +179,26 @@ def _type_clear_row(_: Any) -> Any:
 @type_callable(dot_rows)
 def _type_dot_rows(_: Any) -> Any:
     return lambda A, i, B, k, size: types.float64
+
+
+@type_callable(add_product)
+def _type_add_product(_: Any) -> Any:
+    return lambda A, i, B, j, C, k, size: types.void
+
+
+@type_callable(root_row)
+def _type_root_row(_: Any) -> Any:
+    return lambda A, i, size: types.void
+
+
+@type_callable(angle_row)
+def _type_angle_row(_: Any) -> Any:
+    return lambda A, i, Y, j, X, k, size: types.void
+
+
+@type_callable(turn_row)
+def _type_turn_row(_: Any) -> Any:
+    return lambda A, i, period, size: types.void
 
 
 @lower_builtin(width, types.BaseTuple)
@@ -200,11 +262,7 @@ def _add_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
     if isinstance(size, types.BaseTuple):
         n = len(size)
-        vector = _vector(n)
-        undefined = ir.Constant(vector, ir.Undefined)
-        first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
-        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), n), [0] * n)
-        spread = builder.shuffle_vector(first, undefined, everywhere)
+        spread = _spread(builder, number, _vector(n))
         add(_as_vector(builder, target, n), _as_vector(builder, source, n), spread)
     else:
         with _columns(context, builder, size, args[5]) as j:
@@ -259,6 +317,108 @@ def _dot_rows(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         product = builder.fmul(x, y, flags=_CONTRACT)
         builder.store(builder.fadd(builder.load(total), product, flags=_CONTRACT), total)
     return builder.load(total)
+
+
+@lower_builtin(add_product, *([types.Any] * 7))
+def _add_product(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def add(a: Any, b: Any, c: Any) -> Any:
+        return builder.fadd(a, builder.fmul(b, c, flags=_CONTRACT), flags=_CONTRACT)
+
+    return _each(context, builder, signature.args, args, add)
+
+
+@lower_builtin(root_row, *([types.Any] * 3))
+def _root_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def root(a: Any) -> Any:
+        return _call(builder, "sqrt", a)
+
+    return _each(context, builder, signature.args, args, root)
+
+
+@lower_builtin(turn_row, *([types.Any] * 4))
+def _turn_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kinds, given = signature.args, args
+    period = context.cast(builder, given[2], kinds[2], types.float64)
+
+    def turn(a: Any) -> Any:
+        P = _spread(builder, period, a.type)
+        return builder.fsub(a, builder.fmul(P, _call(builder, "rint", builder.fdiv(a, P))))
+
+    kept = (0, 1, 3)
+    return _each(context, builder, [kinds[i] for i in kept], [given[i] for i in kept], turn)
+
+
+@lower_builtin(angle_row, *([types.Any] * 7))
+def _angle_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def angle(_a: Any, y: Any, x: Any) -> Any:
+        return _arctangent(builder, y, x)
+
+    return _each(context, builder, signature.args, args, angle)
+
+
+def _each(context: Any, builder: Any, kinds: Any, args: Any, function: Any) -> Any:
+    """Put a function of rows, given as (matrix, row) in turn, into the first of them."""
+    size, n = kinds[-1], args[-1]
+    places = [
+        _start(context, builder, kinds[i], args[i], kinds[i + 1], args[i + 1], size, n)
+        for i in range(0, len(kinds) - 1, 2)
+    ]
+    if isinstance(size, types.BaseTuple):
+        rows = [_as_vector(builder, each, len(size)) for each in places]
+        _store(builder, function(*(_load(builder, each) for each in rows)), rows[0])
+    else:
+        with _columns(context, builder, size, n) as j:
+            rows = [_as_vector(builder, builder.gep(each, [j]), 1) for each in places]
+            _store(builder, function(*(_load(builder, each) for each in rows)), rows[0])
+    return context.get_dummy_value()
+
+
+def _arctangent(builder: Any, y: Any, x: Any) -> Any:
+    """Angle of (x, y): atan of at most tan(π/8) by a polynomial, and what symmetry adds to it.
+
+    ``atan(a) = π/4 + atan((a − 1)/(a + 1))`` brings a ratio of up to 1 to within ± tan(π/8).
+    """
+    kind = x.type
+    zero, eighth = _constant(kind, 0.0), _constant(kind, math.tan(math.pi / 8.0))
+    across, along = _call(builder, "fabs", x), _call(builder, "fabs", y)
+    steep = builder.fcmp_ordered(">", along, across)
+    low, high = builder.select(steep, across, along), builder.select(steep, along, across)
+    wide = builder.fcmp_ordered(">", low, builder.fmul(eighth, high))
+    above = builder.select(wide, builder.fsub(low, high), low)
+    under = builder.select(wide, builder.fadd(low, high), high)
+    nothing = builder.fcmp_ordered("==", under, zero)
+    t = builder.fdiv(above, builder.select(nothing, _constant(kind, 1.0), under))
+    z = builder.fmul(t, t)
+    series = _constant(kind, _ARCTANGENT[-1])
+    for each in _ARCTANGENT[-2::-1]:
+        product = builder.fmul(series, z, flags=_CONTRACT)
+        series = builder.fadd(product, _constant(kind, each), flags=_CONTRACT)
+    angle = builder.fmul(t, series)
+    angle = builder.fadd(angle, builder.select(wide, _constant(kind, 0.25 * math.pi), zero))
+    angle = builder.select(steep, builder.fsub(_constant(kind, 0.5 * math.pi), angle), angle)
+    behind = builder.fcmp_ordered("<", x, zero)
+    angle = builder.select(behind, builder.fsub(_constant(kind, math.pi), angle), angle)
+    return _call(builder, "copysign", angle, y)
+
+
+def _call(builder: Any, name: str, *args: Any) -> Any:
+    """Call a function of vectors that the compiler knows."""
+    kind = args[0].type
+    whole = ir.FunctionType(kind, [kind] * len(args))
+    known = cgutils.get_or_insert_function(builder.module, whole, f"llvm.{name}.v{kind.count}f64")
+    return builder.call(known, args)
+
+
+def _constant(kind: Any, value: float) -> Any:
+    return ir.Constant(kind, [value] * kind.count)
+
+
+def _spread(builder: Any, number: Any, kind: Any) -> Any:
+    """Vector of one number everywhere."""
+    undefined = ir.Constant(kind, ir.Undefined)
+    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), kind.count), [0] * kind.count)
+    return builder.shuffle_vector(first, undefined, everywhere)
 
 
 def _number(context: Any, builder: Any, kind: Any, size: Any) -> Any:

@@ -23,14 +23,26 @@ from surefix.filters.linear import LinearTrack, linear_model
 from surefix.filters.linear_step import LinearModel, eliminate_rows, predict_rows, weigh_rows
 from surefix.filters.sigma_point import Spread
 from surefix.jit import inlined, kernel
-from surefix.models.sights import BEARING, COMPONENT, value_of
+from surefix.models.sights import BEARING, COMPONENT, sight_row
 from surefix.robust.loss import Loss, loss_named
-from surefix.rows import ONE, Size, add_row, clear_row, copy_row, scratch, width
+from surefix.rows import (
+    ONE,
+    Size,
+    add_row,
+    clear_row,
+    copy_row,
+    dot_rows,
+    scratch,
+    size_of,
+    turn_row,
+    width,
+)
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_sights"]
 
 _TURN = 2.0 * math.pi
+_AXES: Size = (None, None, None)
 
 
 def filter_sights(
@@ -87,14 +99,15 @@ def filter_sights(
         raise OptionsError(f"kinds {codes.tolist()}", "codes of surefix.models.sights")
     if d == 1 and ((codes > 0) & (codes < COMPONENT)).any():
         raise OptionsError("an angle on one axis", "anchors on two axes or three")
-    points = spread or Spread()
-    reach = points.alpha**2 * (n + points.kappa)
-    if not (reach > 0.0 and points.alpha > 0.0 and points.beta >= points.alpha**2):
-        raise OptionsError(f"{points} for {n} states", "α > 0, n + κ > 0, β ≥ α²")
+    at = spread or Spread()
+    reach = at.alpha**2 * (n + at.kappa)
+    if not (reach > 0.0 and at.alpha > 0.0 and at.beta >= at.alpha**2):
+        raise OptionsError(f"{at} for {n} states", "α > 0, n + κ > 0, β ≥ α²")
     loss = loss or loss_named("kalman")
     if loss.code == 6:
         raise OptionsError("loss 'student-t'", "a loss of the innovation", "use huber or igg3")
     model = linear_model(F, Q, np.zeros((m, n)), R, (n, m, N))
+    moving = d if (codes < COMPONENT + d).all() else n
     mean, covariance = np.empty((N, n)), np.empty((N * n, n))
     found = tuple(np.empty(seen.shape) for _ in range(3))
     _run(
@@ -102,8 +115,9 @@ def filter_sights(
         loss,
         codes,
         np.ascontiguousarray(places).reshape(-1, d),
-        d if (codes < COMPONENT + d).all() else n,
-        (reach, points.beta - points.alpha**2),
+        moving,
+        size_of(2 * moving + 1),
+        (reach, at.beta - at.alpha**2),
         np.ascontiguousarray(x.mean[None], dtype=np.float64),
         np.ascontiguousarray(x.covariance),
         seen,
@@ -127,26 +141,23 @@ def _columns(P: FloatArray, L: FloatArray, y: FloatArray, count: int, states: Si
 
 
 @inlined
-def _evaluate(
-    kind: IntArray,
-    anchors: FloatArray,
-    first: int,
-    point: FloatArray,
-    d: int,
-    centre: FloatArray,
-    out: FloatArray,
-    j: int,
-    components: Size,
+def _points(
+    x: FloatArray,
+    L: FloatArray,
+    gamma: float,
+    moving: int,
+    ones: FloatArray,
+    signs: FloatArray,
+    X: FloatArray,
+    states: Size,
+    points: Size,
 ) -> None:
-    """Sights of one point, less those of the centre, into row j."""
-    for c in range(width(components)):
-        away = value_of(kind[c], anchors, first + c, point, d) - centre[0, c]
-        out[j, c] = _turned(away, kind[c])
-
-
-@inlined
-def _turned(angle: float, kind: int) -> float:
-    return float(angle - _TURN * np.rint(angle / _TURN)) if kind == BEARING else angle
+    """Put the points into the columns of X: the centre, then ± γ times each column of L."""
+    for i in range(width(states)):
+        clear_row(X, i, points)
+        add_row(X, i, x[0, i], ones, 0, points)
+        for j in range(moving):
+            add_row(X, i, gamma * L[j, i], signs, j, points)
 
 
 @kernel
@@ -156,6 +167,7 @@ def _run(
     kind: IntArray,
     anchors: FloatArray,
     moving: int,
+    points: Size,
     spread: tuple[float, float],
     start: FloatArray,
     first: FloatArray,
@@ -167,47 +179,50 @@ def _run(
     weights: FloatArray,
 ) -> None:
     states, components = model.states, model.components
-    n, m, d = width(states), width(components), anchors.shape[1]
+    n, m, count = width(states), width(components), 2 * moving + 1
     reach, bend = spread
     gamma, share = math.sqrt(reach), 0.5 / reach
-    x, y, point = scratch(ONE, states), scratch(ONE, states), scratch(ONE, states)
-    e, centre, shift = scratch(ONE, components), scratch(ONE, components), scratch(ONE, components)
+    x, y, e = scratch(ONE, states), scratch(ONE, states), scratch(ONE, components)
     used, root = scratch(ONE, components), scratch(ONE, components)
     P, A, L = scratch(states, states), scratch(states, states), scratch(states, states)
-    up, down = scratch(states, components), scratch(states, components)
     B, S = scratch(components, states), scratch(components, components)
-    T = scratch(components, components)
+    T, shift = scratch(components, components), scratch(ONE, components)
+    X, Y = scratch(states, points), scratch(components, points)
+    ones, signs, off = scratch(ONE, points), scratch(states, points), scratch(_AXES, points)
     F, F_T, Q, R = model.F, model.F_T, model.Q, model.R
     f_step, q_step = n * (F.shape[0] > n), n * (Q.shape[0] > n)
     r_step, a_step = m * (R.shape[0] > m), m * (anchors.shape[0] > m)
     copy_row(x, 0, start, 0, states)
     for i in range(n):
         copy_row(P, i, first, i, states)
+    for p in range(count):
+        ones[0, p] = 1.0
+        for j in range(moving):
+            signs[j, p] = 1.0 if p == 1 + j else -1.0 if p == 1 + moving + j else 0.0
     for k in range(z.shape[0]):
         predict_rows(x, P, y, A, F, F_T, f_step * k, Q, q_step * k, states)
         _columns(P, L, y, moving, states)
+        _points(x, L, gamma, moving, ones, signs, X, states, points)
         r, a = r_step * k, a_step * k
-        clear_row(shift, 0, components)
-        clear_row(centre, 0, components)
         for c in range(m):
-            centre[0, c] = value_of(kind[c], anchors, a + c, x, d)
-        for j in range(moving):
-            copy_row(point, 0, x, 0, states)
-            add_row(point, 0, gamma, L, j, states)
-            _evaluate(kind, anchors, a, point, d, centre, up, j, components)
-            add_row(point, 0, -2.0 * gamma, L, j, states)
-            _evaluate(kind, anchors, a, point, d, centre, down, j, components)
-            add_row(shift, 0, share, up, j, components)
-            add_row(shift, 0, share, down, j, components)
-        for c in range(m):
-            copy_row(S, c, R, r + c, components)
-            add_row(S, c, bend * shift[0, c], shift, 0, components)
+            sight_row(kind[c], anchors, a + c, X, ones, off, Y, c, points)
+            centre = Y[c, 0]
+            add_row(Y, c, -centre, ones, 0, points)
+            if kind[c] == BEARING:
+                turn_row(Y, c, _TURN, points)
+            shift[0, c] = share * dot_rows(Y, c, ones, 0, points)
+            e[0, c] = z[k, c] - centre - shift[0, c]
+            if kind[c] == BEARING:
+                e[0, c] -= _TURN * np.rint(e[0, c] / _TURN)
             clear_row(B, c, states)
             for j in range(moving):
-                add_row(S, c, share * up[j, c], up, j, components)
-                add_row(S, c, share * down[j, c], down, j, components)
-                add_row(B, c, 0.5 / gamma * (up[j, c] - down[j, c]), L, j, states)
-            e[0, c] = _turned(z[k, c] - centre[0, c] - shift[0, c], kind[c])
+                slope = 0.5 / gamma * (Y[c, 1 + j] - Y[c, 1 + moving + j])
+                add_row(B, c, slope, L, j, states)
+        for c in range(m):
+            for d in range(c + 1):
+                S[c, d] = R[r + c, d] + bend * shift[0, c] * shift[0, d]
+                S[c, d] += share * dot_rows(Y, c, Y, d, points)
+                S[d, c] = S[c, d]
             seen = e[0, c] if abs(e[0, c]) < np.inf else np.nan
             residual[k, c] = seen
             nis[k, c] = seen * seen / S[c, c]

@@ -18,6 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.jit import helper, inlined, kernel
+from surefix.rows import (
+    Size,
+    add_product,
+    add_row,
+    angle_row,
+    clear_row,
+    copy_row,
+    root_row,
+)
 from surefix.types import FloatArray, IntArray
 
 __all__ = [
@@ -28,7 +37,7 @@ __all__ = [
     "expected",
     "period_of",
     "sight",
-    "value_of",
+    "sight_row",
 ]
 
 RANGE: Final = 0
@@ -80,8 +89,18 @@ def sight(kind: int, anchor: FloatArray, x: FloatArray, d: int, H: FloatArray) -
 
 
 @inlined
-def value_of(kind: int, anchors: FloatArray, c: int, x: FloatArray, d: int) -> float:
-    """Value of a sight as `sight` gives it, without the Jacobian.
+def sight_row(
+    kind: int,
+    anchors: FloatArray,
+    c: int,
+    X: FloatArray,
+    ones: FloatArray,
+    off: FloatArray,
+    Y: FloatArray,
+    row: int,
+    points: Size,
+) -> None:
+    """Values of a sight of many points at once, as `sight` gives them, into a row of ``Y``.
 
     Parameters
     ----------
@@ -89,21 +108,36 @@ def value_of(kind: int, anchors: FloatArray, c: int, x: FloatArray, d: int) -> f
         A code of this module.
     anchors, c
         (…, d) m, and which row is the anchor.
-    x
-        (1, n) state that begins with the position.
+    X
+        (n, points) states, which begin with the position, a point a column.
+    ones, off
+        (1, points) ones, and (3, points) scratch.
+    Y, row
+        (…, points) and the row to fill.
+    points
+        How many, see `surefix.rows`.
     """
+    d = anchors.shape[1]
     if kind >= COMPONENT:
         i = kind - COMPONENT
-        return float(x[0, i] - anchors[c, i]) if i < d else float(x[0, i])
-    east = x[0, 0] - anchors[c, 0]
-    north = x[0, 1] - anchors[c, 1] if d > 1 else 0.0
-    up = x[0, 2] - anchors[c, 2] if d == 3 else 0.0
+        copy_row(Y, row, X, i, points)
+        if i < d:
+            add_row(Y, row, -anchors[c, i], ones, 0, points)
+        return
+    for i in range(3):
+        clear_row(off, i, points)
+        if i < d:
+            copy_row(off, i, X, i, points)
+            add_row(off, i, -anchors[c, i], ones, 0, points)
     if kind == BEARING:
-        return math.atan2(east, north)
-    flat = east * east + north * north
-    if kind == RANGE:
-        return max(math.sqrt(flat + up * up), _TINY)
-    return math.atan2(up, max(math.sqrt(flat), _TINY))
+        angle_row(Y, row, off, 0, off, 1, points)
+        return
+    clear_row(Y, row, points)
+    for i in range(2 if kind == ELEVATION else 3):
+        add_product(Y, row, off, i, off, i, points)
+    root_row(Y, row, points)
+    if kind == ELEVATION:
+        angle_row(Y, row, off, 2, Y, row, points)
 
 
 @helper
