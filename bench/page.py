@@ -18,9 +18,9 @@ FONT = "font-family='system-ui, Segoe UI, Helvetica, Arial, sans-serif'"
 HEAD = """# Benchmarks
 
 Made by `make bench`, which runs everything side by side in one process: each round times every
-contestant in turn, so that all see the same machine. A cost is the median of the rounds with its
-quartiles; ratios are medians of ratios within a round. *Differs* is the largest difference of any
-figure from ours, as a share of the largest figure.
+contestant in turn, the best of five short runs, so that all see the same machine. A cost is the
+median of the rounds with its quartiles; ratios are medians of ratios within a round. *Differs* is
+the largest difference of any figure from ours, as a share of the largest figure.
 
 """
 

@@ -44,7 +44,8 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
     )
-    return cast(Callable[P, T], part(function))
+    inside: Callable[P, T] = part(function)
+    return inside
 
 
 def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:

@@ -10,7 +10,6 @@ Matrices are C-contiguous and exactly as wide as the size says; rows are ``A[i, 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeAlias
@@ -23,6 +22,16 @@ from numba.extending import lower_builtin, type_callable
 from numba.np import arrayobj
 
 from surefix.types import FloatArray
+from surefix.vectors import (
+    CONTRACT,
+    arctangent,
+    as_vector,
+    call_vector,
+    load,
+    spread_out,
+    store,
+    vector_of,
+)
 
 __all__ = [
     "ONE",
@@ -48,21 +57,6 @@ ONE: Size = (None,)
 """Size of a matrix of one row: a vector."""
 
 _LARGEST = 18  # twice the largest state: a factor beside that of its noise
-
-
-def _by_chebyshev(degree: int) -> tuple[float, ...]:
-    """Powers of z = t² that make ``atan(t)/t`` for t up to tan(π/8)."""
-    reach = math.tan(math.pi / 8.0) ** 2
-
-    def ratio(z: FloatArray) -> FloatArray:
-        return np.arctan(np.sqrt(z)) / np.sqrt(z)
-
-    found = np.polynomial.Chebyshev.interpolate(ratio, degree, domain=[0.0, reach])
-    return tuple(found.convert(kind=np.polynomial.Polynomial).coef.tolist())
-
-
-_ARCTANGENT = _by_chebyshev(11)
-_CONTRACT = ("contract",)  # a product and a sum may become one instruction
 
 
 def size_of(n: int) -> Size:
@@ -257,13 +251,13 @@ def _add_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     number = context.cast(builder, args[2], factor, types.float64)
 
     def add(at: Any, of: Any, times: Any) -> None:
-        product = builder.fmul(times, _load(builder, of), flags=_CONTRACT)
-        _store(builder, builder.fadd(_load(builder, at), product, flags=_CONTRACT), at)
+        product = builder.fmul(times, load(builder, of), flags=CONTRACT)
+        store(builder, builder.fadd(load(builder, at), product, flags=CONTRACT), at)
 
     if isinstance(size, types.BaseTuple):
         n = len(size)
-        spread = _spread(builder, number, _vector(n))
-        add(_as_vector(builder, target, n), _as_vector(builder, source, n), spread)
+        spread = spread_out(builder, number, vector_of(n))
+        add(as_vector(builder, target, n), as_vector(builder, source, n), spread)
     else:
         with _columns(context, builder, size, args[5]) as j:
             add(builder.gep(target, [j]), builder.gep(source, [j]), number)
@@ -277,11 +271,11 @@ def _copy_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     source = _start(context, builder, b, args[2], k, args[3], size, args[4])
     if isinstance(size, types.BaseTuple):
         n = len(size)
-        value = _load(builder, _as_vector(builder, source, n))
-        _store(builder, value, _as_vector(builder, target, n))
+        value = load(builder, as_vector(builder, source, n))
+        store(builder, value, as_vector(builder, target, n))
     else:
         with _columns(context, builder, size, args[4]) as j:
-            _store(builder, _load(builder, builder.gep(source, [j])), builder.gep(target, [j]))
+            store(builder, load(builder, builder.gep(source, [j])), builder.gep(target, [j]))
     return context.get_dummy_value()
 
 
@@ -291,10 +285,10 @@ def _clear_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     target = _start(context, builder, a, args[0], i, args[1], size, args[2])
     if isinstance(size, types.BaseTuple):
         n = len(size)
-        _store(builder, ir.Constant(_vector(n), [0.0] * n), _as_vector(builder, target, n))
+        store(builder, ir.Constant(vector_of(n), [0.0] * n), as_vector(builder, target, n))
     else:
         with _columns(context, builder, size, args[2]) as j:
-            _store(builder, ir.Constant(ir.DoubleType(), 0.0), builder.gep(target, [j]))
+            store(builder, ir.Constant(ir.DoubleType(), 0.0), builder.gep(target, [j]))
     return context.get_dummy_value()
 
 
@@ -306,23 +300,23 @@ def _dot_rows(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     zero = ir.Constant(ir.DoubleType(), 0.0)
     if isinstance(size, types.BaseTuple):
         n = len(size)
-        x, y = (_load(builder, _as_vector(builder, each, n)) for each in (one, other))
-        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), _vector(n)])
+        x, y = (load(builder, as_vector(builder, each, n)) for each in (one, other))
+        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), vector_of(n)])
         name = f"llvm.vector.reduce.fadd.v{n}f64"
         add = cgutils.get_or_insert_function(builder.module, kind, name)
         return builder.call(add, [zero, builder.fmul(x, y)], fastmath=("reassoc",))
     total = cgutils.alloca_once_value(builder, zero)
     with _columns(context, builder, size, args[4]) as j:
-        x, y = (_load(builder, builder.gep(each, [j])) for each in (one, other))
-        product = builder.fmul(x, y, flags=_CONTRACT)
-        builder.store(builder.fadd(builder.load(total), product, flags=_CONTRACT), total)
+        x, y = (load(builder, builder.gep(each, [j])) for each in (one, other))
+        product = builder.fmul(x, y, flags=CONTRACT)
+        builder.store(builder.fadd(builder.load(total), product, flags=CONTRACT), total)
     return builder.load(total)
 
 
 @lower_builtin(add_product, *([types.Any] * 7))
 def _add_product(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     def add(a: Any, b: Any, c: Any) -> Any:
-        return builder.fadd(a, builder.fmul(b, c, flags=_CONTRACT), flags=_CONTRACT)
+        return builder.fadd(a, builder.fmul(b, c, flags=CONTRACT), flags=CONTRACT)
 
     return _each(context, builder, signature.args, args, add)
 
@@ -330,7 +324,7 @@ def _add_product(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 @lower_builtin(root_row, *([types.Any] * 3))
 def _root_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     def root(a: Any) -> Any:
-        return _call(builder, "sqrt", a)
+        return call_vector(builder, "sqrt", a)
 
     return _each(context, builder, signature.args, args, root)
 
@@ -341,8 +335,8 @@ def _turn_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     period = context.cast(builder, given[2], kinds[2], types.float64)
 
     def turn(a: Any) -> Any:
-        P = _spread(builder, period, a.type)
-        return builder.fsub(a, builder.fmul(P, _call(builder, "rint", builder.fdiv(a, P))))
+        P = spread_out(builder, period, a.type)
+        return builder.fsub(a, builder.fmul(P, call_vector(builder, "rint", builder.fdiv(a, P))))
 
     kept = (0, 1, 3)
     return _each(context, builder, [kinds[i] for i in kept], [given[i] for i in kept], turn)
@@ -351,7 +345,7 @@ def _turn_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 @lower_builtin(angle_row, *([types.Any] * 7))
 def _angle_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     def angle(_a: Any, y: Any, x: Any) -> Any:
-        return _arctangent(builder, y, x)
+        return arctangent(builder, y, x)
 
     return _each(context, builder, signature.args, args, angle)
 
@@ -364,61 +358,13 @@ def _each(context: Any, builder: Any, kinds: Any, args: Any, function: Any) -> A
         for i in range(0, len(kinds) - 1, 2)
     ]
     if isinstance(size, types.BaseTuple):
-        rows = [_as_vector(builder, each, len(size)) for each in places]
-        _store(builder, function(*(_load(builder, each) for each in rows)), rows[0])
+        rows = [as_vector(builder, each, len(size)) for each in places]
+        store(builder, function(*(load(builder, each) for each in rows)), rows[0])
     else:
         with _columns(context, builder, size, n) as j:
-            rows = [_as_vector(builder, builder.gep(each, [j]), 1) for each in places]
-            _store(builder, function(*(_load(builder, each) for each in rows)), rows[0])
+            rows = [as_vector(builder, builder.gep(each, [j]), 1) for each in places]
+            store(builder, function(*(load(builder, each) for each in rows)), rows[0])
     return context.get_dummy_value()
-
-
-def _arctangent(builder: Any, y: Any, x: Any) -> Any:
-    """Angle of (x, y): atan of at most tan(π/8) by a polynomial, and what symmetry adds to it.
-
-    ``atan(a) = π/4 + atan((a − 1)/(a + 1))`` brings a ratio of up to 1 to within ± tan(π/8).
-    """
-    kind = x.type
-    zero, eighth = _constant(kind, 0.0), _constant(kind, math.tan(math.pi / 8.0))
-    across, along = _call(builder, "fabs", x), _call(builder, "fabs", y)
-    steep = builder.fcmp_ordered(">", along, across)
-    low, high = builder.select(steep, across, along), builder.select(steep, along, across)
-    wide = builder.fcmp_ordered(">", low, builder.fmul(eighth, high))
-    above = builder.select(wide, builder.fsub(low, high), low)
-    under = builder.select(wide, builder.fadd(low, high), high)
-    nothing = builder.fcmp_ordered("==", under, zero)
-    t = builder.fdiv(above, builder.select(nothing, _constant(kind, 1.0), under))
-    z = builder.fmul(t, t)
-    series = _constant(kind, _ARCTANGENT[-1])
-    for each in _ARCTANGENT[-2::-1]:
-        product = builder.fmul(series, z, flags=_CONTRACT)
-        series = builder.fadd(product, _constant(kind, each), flags=_CONTRACT)
-    angle = builder.fmul(t, series)
-    angle = builder.fadd(angle, builder.select(wide, _constant(kind, 0.25 * math.pi), zero))
-    angle = builder.select(steep, builder.fsub(_constant(kind, 0.5 * math.pi), angle), angle)
-    behind = builder.fcmp_ordered("<", x, zero)
-    angle = builder.select(behind, builder.fsub(_constant(kind, math.pi), angle), angle)
-    return _call(builder, "copysign", angle, y)
-
-
-def _call(builder: Any, name: str, *args: Any) -> Any:
-    """Call a function of vectors that the compiler knows."""
-    kind = args[0].type
-    whole = ir.FunctionType(kind, [kind] * len(args))
-    known = cgutils.get_or_insert_function(builder.module, whole, f"llvm.{name}.v{kind.count}f64")
-    return builder.call(known, args)
-
-
-def _constant(kind: Any, value: float) -> Any:
-    return ir.Constant(kind, [value] * kind.count)
-
-
-def _spread(builder: Any, number: Any, kind: Any) -> Any:
-    """Vector of one number everywhere."""
-    undefined = ir.Constant(kind, ir.Undefined)
-    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
-    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), kind.count), [0] * kind.count)
-    return builder.shuffle_vector(first, undefined, everywhere)
 
 
 def _number(context: Any, builder: Any, kind: Any, size: Any) -> Any:
@@ -443,21 +389,3 @@ def _columns(context: Any, builder: Any, kind: Any, size: Any) -> Iterator[Any]:
     """Loop over the columns where their number is not known; gives the index."""
     with cgutils.for_range(builder, _number(context, builder, kind, size)) as loop:
         yield loop.index
-
-
-def _vector(n: int) -> Any:
-    return ir.VectorType(ir.DoubleType(), n)
-
-
-def _as_vector(builder: Any, row: Any, n: int) -> Any:
-    return builder.bitcast(row, _vector(n).as_pointer())
-
-
-def _load(builder: Any, place: Any) -> Any:
-    value = builder.load(place)
-    value.align = 8
-    return value
-
-
-def _store(builder: Any, value: Any, place: Any) -> None:
-    builder.store(value, place).align = 8
