@@ -42,6 +42,7 @@ from surefix.types import FloatArray, IntArray
 __all__ = ["filter_sights"]
 
 _TURN = 2.0 * math.pi
+_LANES = 4  # of a vector; spare ones repeat the centre, which adds nothing
 _AXES: Size = (None, None, None)
 
 
@@ -116,7 +117,7 @@ def filter_sights(
         codes,
         np.ascontiguousarray(places).reshape(-1, d),
         moving,
-        size_of(2 * moving + 1),
+        size_of(-(-(2 * moving + 1) // _LANES) * _LANES),
         (reach, at.beta - at.alpha**2),
         np.ascontiguousarray(x.mean[None], dtype=np.float64),
         np.ascontiguousarray(x.covariance),
@@ -179,7 +180,7 @@ def _run(
     weights: FloatArray,
 ) -> None:
     states, components = model.states, model.components
-    n, m, count = width(states), width(components), 2 * moving + 1
+    n, m = width(states), width(components)
     reach, bend = spread
     gamma, share = math.sqrt(reach), 0.5 / reach
     x, y, e = scratch(ONE, states), scratch(ONE, states), scratch(ONE, components)
@@ -195,7 +196,7 @@ def _run(
     copy_row(x, 0, start, 0, states)
     for i in range(n):
         copy_row(P, i, first, i, states)
-    for p in range(count):
+    for p in range(width(points)):
         ones[0, p] = 1.0
         for j in range(moving):
             signs[j, p] = 1.0 if p == 1 + j else -1.0 if p == 1 + moving + j else 0.0
