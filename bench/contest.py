@@ -65,6 +65,7 @@ def decide(contest: Contest, rounds: int) -> list[Standing]:
     budget = {each.name: _rounds(each, repeats[each.name], rounds) for each in contest.contestants}
     costs: dict[str, list[float]] = {each.name: [] for each in contest.contestants}
     beside: dict[str, list[float]] = {each.name: [] for each in contest.contestants}
+    rounds = budget[ours.name]
     for turn in range(rounds):
         mine = _cost(ours, repeats[ours.name])
         costs[ours.name].append(mine)
@@ -103,7 +104,9 @@ def _repeats(each: Contestant) -> int:
 
 def _rounds(each: Contestant, repeats: int, rounds: int) -> int:
     """Slow contestants have fewer turns, at least three."""
-    return int(np.clip(SPENT / max(BEST_OF * seconds(each.run) * repeats, 1e-9), 3, rounds))
+    burst = seconds(each.run) * repeats
+    tries = BEST_OF if burst < LONG else 1
+    return int(np.clip(SPENT / max(tries * burst, 1e-9), 3, rounds))
 
 
 def _cost(each: Contestant, repeats: int) -> float:
@@ -113,9 +116,12 @@ def _cost(each: Contestant, repeats: int) -> float:
         for _ in range(repeats):
             each.run()
 
-    each.run()  # whoever was before has left the caches full of something else
-    tries = BEST_OF if seconds(burst) < LONG else 1
-    return min(seconds(burst) for _ in range(tries)) / (repeats * each.count)
+    if repeats > 1:
+        each.run()  # whoever was before has left the caches full of something else
+    best = seconds(burst)
+    if best < LONG:
+        best = min(best, *(seconds(burst) for _ in range(BEST_OF - 1)))
+    return best / (repeats * each.count)
 
 
 def _agreement(ours: Contestant, other: Contestant, warm: dict[str, object]) -> float | None:
