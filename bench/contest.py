@@ -10,7 +10,7 @@ import numpy as np
 
 BURST = 0.002  # s: a short run is less likely to be interrupted
 BEST_OF = 5  # bursts in a round: what else the machine does strikes the best of them least
-LONG = 0.2  # s: a burst that is long is taken once
+LONG, LONGEST = 0.2, 5.0  # s: a long burst is taken twice, the first of them finds the memory
 SPENT = 4.0  # s for each slow contestant
 
 
@@ -119,9 +119,8 @@ def _cost(each: Contestant, repeats: int) -> float:
     if repeats > 1:
         each.run()  # whoever was before has left the caches full of something else
     best = seconds(burst)
-    if best < LONG:
-        best = min(best, *(seconds(burst) for _ in range(BEST_OF - 1)))
-    return best / (repeats * each.count)
+    more = BEST_OF if best < LONG else 2 if best < LONGEST else 1
+    return min(best, *(seconds(burst) for _ in range(more - 1)), np.inf) / (repeats * each.count)
 
 
 def _agreement(ours: Contestant, other: Contestant, warm: dict[str, object]) -> float | None:

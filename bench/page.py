@@ -36,6 +36,9 @@ NOTES = """
   figures are not compared.
 - **One call an epoch**: state and covariance come back to Python each time.
 - **Running median**: normal noise, compared where the whole window lies inside the series.
+- **Tracks**: about a gigabyte is written, and what the system takes to find that memory is a large
+  part of the time. Without missing observations all tracks have one covariance, which `vmap`
+  computes once; ours is computed for each, as it must be where any are missing or weighed.
 - **Hampel**: the peer computes in single precision.
 - **Hypotheses** and the filter and smoother of `surefix clean` have no peer that does the same.
 """
