@@ -6,8 +6,9 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 CANDIDATES := $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
 KERNELS := build/kernels
+BENCH := .venv-bench
 
-.PHONY: help demo test lint format lock clean
+.PHONY: help demo test lint format lock bench clean
 .DEFAULT_GOAL := help
 
 help:
@@ -15,6 +16,7 @@ help:
 	@echo 'make test    check style, types and layers, and run every test'
 	@echo 'make lint    check style, types and layers only'
 	@echo 'make format  put the code into its style'
+	@echo 'make bench   time surefix beside its peers, and write docs/benchmarks.*'
 	@echo 'make lock    resolve the dependencies anew into requirements.lock'
 	@echo 'make clean   remove what make made'
 
@@ -43,8 +45,20 @@ lock: $(INSTALLED)
 	  --no-emit-index-url --custom-compile-command 'make lock' \
 	  --output-file requirements.lock pyproject.toml -
 
+# Peers live in an environment of their own, and one that cannot be installed is left out.
+bench: $(BENCH)/.installed
+	NUMBA_CACHE_DIR=$(KERNELS) $(BENCH)/bin/python bench/run.py
+
+$(BENCH)/.installed: $(INSTALLED) bench/requirements.txt
+	$(BIN)/python -m venv $(BENCH)
+	@$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@grep -v '^#' bench/requirements.txt | while read -r peer; do \
+	  $(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" \
+	    || echo "$$peer cannot be installed: skipped"; done
+	@touch $@
+
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 
 $(INSTALLED): requirements.lock pyproject.toml
 	@found=; for python in $(CANDIDATES); do \

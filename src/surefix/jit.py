@@ -14,7 +14,16 @@ import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["compilations", "helper", "inner", "kernel", "lean_helper", "lean_kernel"]
+__all__ = [
+    "compilations",
+    "helper",
+    "inlined",
+    "inner",
+    "kernel",
+    "lean_helper",
+    "lean_kernel",
+    "threaded_kernel",
+]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -92,3 +101,25 @@ def inner(function: Callable[P, T]) -> Callable[P, T]:
     That is for what is called often or from one place: it is compiled at every place anew.
     """
     return register_jitable(error_model="numpy", forceinline=True, **_LEAN)(function)
+
+
+def inlined(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function that is made part of the machine code of each kernel that calls it.
+
+    Sizes that the caller knows (see `surefix.rows`) are then known inside, and no array is counted
+    on the way. A product and a sum may become one instruction.
+    """
+    part = register_jitable(
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract"},
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )
+    inside: Callable[P, T] = part(function)
+    return inside
+
+
+def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
+    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function))
