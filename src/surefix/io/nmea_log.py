@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -105,11 +106,8 @@ def read_nmea(
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
                 for state, found in pieces(state, block):
-                    if isinstance(found, Plain):
-                        reader.count(found.unknown)
-                    some = found.records if isinstance(found, Plain) else found
-                    for at in range(0, len(some), step):
-                        reader.add(some[at : at + step])
+                    for _ in range(0, reader.begin(found), step):
+                        reader.add(step)
                         if reader.size >= chunk_fixes:
                             yield reader.chunk()
                             given += 1
@@ -118,7 +116,7 @@ def read_nmea(
                     progress(done)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", "a readable file") from error
-    reader.add(finish(state))
+    reader.add(reader.begin(finish(state)))
     rest = reader.chunk(last=True)
     if not given or rest.fixes or rest.channels or rest.problems or rest.counts:
         yield rest
@@ -136,6 +134,7 @@ class _Reader:
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
+        self._coming: Iterator[Frame] | Iterator[tuple[int, float, Record]] = iter(())
         self._reported: set[str] = set()
         self._line = 0
         self._take: dict[type, Callable[..., None]] = {
@@ -154,19 +153,27 @@ class _Reader:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
-    def count(self, unknown: Mapping[str, int]) -> None:
-        """Count sentences of unknown types."""
-        for kind, count in unknown.items():
-            self._counts[kind] = self._counts.get(kind, 0) + count
+    def begin(self, found: Plain | list[Frame]) -> int:
+        """Take the next piece of the log; gives how many records or frames are in it."""
+        if not isinstance(found, Plain):
+            self._coming = iter(found)
+            return len(found)
+        self._count(found.unknown)
+        self._coming = found.records
+        return found.count
 
-    def add(self, found: Sequence[Frame | tuple[int, float, Record]]) -> None:
-        """Read the next frames, or the records of the next plain lines."""
-        for item in found:
+    def add(self, most: int) -> None:
+        """Read so many records or frames of the piece, or what is left of it."""
+        for item in islice(self._coming, most):
             if len(item) == 3:
                 self._line, self._clock.receive, record = item
                 self._heed(record)
             else:
                 self._add(item)
+
+    def _count(self, unknown: Mapping[str, int]) -> None:
+        for kind, count in unknown.items():
+            self._counts[kind] = self._counts.get(kind, 0) + count
 
     def _add(self, item: Frame) -> None:
         line, prefix, text, problem = item
@@ -182,7 +189,7 @@ class _Reader:
         if not isinstance(record, Refused):
             self._heed(record)
         elif record.kind == "unknown-type":
-            self.count({record.text: 1})
+            self._count({record.text: 1})
         else:
             self._problem(record.kind, line, text)
 
