@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ class Plain(NamedTuple):
 
     Parameters
     ----------
-    count
+    total
         How many records there are.
     records
         Of each line its number, from 1, its time of reception, s, NaN if it has none, and what its
@@ -49,7 +50,7 @@ class Plain(NamedTuple):
         How many sentences there are of each unknown type.
     """
 
-    count: int
+    total: int
     records: Iterator[tuple[int, float, Record]]
     unknown: dict[str, int]
 
@@ -132,7 +133,7 @@ def _records(
 
 
 def _day(value: float) -> int | None:
-    return int(value) if value == value else None
+    return None if isnan(value) else int(value)
 
 
 def _position(talker: str, kind: str, v: _Values) -> Position:

@@ -105,7 +105,8 @@ def read_nmea(
     try:
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
-                for state, found in pieces(state, block):
+                for after, found in pieces(state, block):
+                    state = after
                     for _ in range(0, reader.begin(found), step):
                         reader.add(step)
                         if reader.size >= chunk_fixes:
@@ -134,7 +135,7 @@ class _Reader:
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
-        self._coming: Iterator[Frame] | Iterator[tuple[int, float, Record]] = iter(())
+        self._coming: Iterator[Frame | tuple[int, float, Record]] = iter(())
         self._reported: set[str] = set()
         self._line = 0
         self._take: dict[type, Callable[..., None]] = {
@@ -160,16 +161,16 @@ class _Reader:
             return len(found)
         self._count(found.unknown)
         self._coming = found.records
-        return found.count
+        return found.total
 
     def add(self, most: int) -> None:
         """Read so many records or frames of the piece, or what is left of it."""
         for item in islice(self._coming, most):
-            if len(item) == 3:
+            if isinstance(item, Frame):
+                self._add(item)
+            else:
                 self._line, self._clock.receive, record = item
                 self._heed(record)
-            else:
-                self._add(item)
 
     def _count(self, unknown: Mapping[str, int]) -> None:
         for kind, count in unknown.items():

@@ -57,7 +57,9 @@ def _words(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Text to be printed; what occurs more than once, such as a verdict, is looked at once."""
     coded = column.combine_chunks().dictionary_encode()
     words = escaped(pa.chunked_array([coded.dictionary])).combine_chunks()
-    return pa.chunked_array([pa.DictionaryArray.from_arrays(coded.indices, words).cast(column.type)])
+    return pa.chunked_array(
+        [pa.DictionaryArray.from_arrays(coded.indices, words).cast(column.type)]
+    )
 
 
 def escaped(column: pa.ChunkedArray) -> pa.ChunkedArray:
