@@ -24,7 +24,10 @@ from surefix.types import ByteArray, FloatArray, IntArray
 
 __all__ = ["TYPES", "decode"]
 
-TYPES = tuple("GGA GNS RMC GLL VTG HDT HDM THS HDG VHW DPT DBT ZDA GST".split())
+TYPES = (
+    *("GGA", "GNS", "RMC", "GLL", "VTG", "HDT", "HDM"),
+    *("THS", "HDG", "VHW", "DPT", "DBT", "ZDA", "GST"),
+)
 """Sentence types that are read here, by their code."""
 
 _GGA, _GNS, _RMC, _GLL, _VTG, _HDT, _HDM, _THS, _HDG, _VHW, _DPT, _DBT, _ZDA, _GST = range(14)
