@@ -9,7 +9,7 @@ from surefix.pipelines.joining import thinned
 def test_a_thinned_result_shares_no_memory_with_the_whole() -> None:
     time = np.arange(200.0)
     log = {"time": time, "x": np.sin(time), "y": time, "heading": time % 360.0}
-    whole = surefix.clean(log, method="igg3")
+    whole = surefix.clean(log, options=surefix.CleanOptions(method="igg3"))
     few = thinned(whole, 4)
     for name in ("raw_position", "raw_coordinates", "sensor", "row"):
         part, all_of_it = getattr(few, name), getattr(whole, name)
