@@ -39,14 +39,14 @@ _LEAN: Final[Mapping[str, Any]] = {
 def compilations(tell: Callable[[str], None]) -> Iterator[None]:
     """Tell the name of each kernel before it is compiled; what comes from disk is not told."""
     watch = _Watch(tell)
-    event.register("numba:compile", watch)
+    event.register("numba:compile", watch)  # type: ignore[no-untyped-call]
     try:
         yield
     finally:
-        event.unregister("numba:compile", watch)
+        event.unregister("numba:compile", watch)  # type: ignore[no-untyped-call]
 
 
-class _Watch(event.Listener):  # type: ignore[misc]  # numba has no types
+class _Watch(event.Listener):
     """Hears of compilations; those of the parts of a kernel belong to it."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
@@ -57,7 +57,7 @@ class _Watch(event.Listener):  # type: ignore[misc]  # numba has no types
         if self._depth == 1:
             self._tell(str(event.data["dispatcher"].py_func.__name__))
 
-    def on_end(self, event: event.Event) -> None:  # noqa: ARG002
+    def on_end(self, _event: event.Event) -> None:
         self._depth -= 1
 
 
@@ -73,8 +73,9 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
     on disk, and one version serves all constants it is called with: that saves a tenth to a half of
     the compilation.
     """
-    compiled = register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-    return cast(Callable[P, T], compiled(function))
+    part = register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    compiled: Callable[P, T] = part(function)
+    return compiled
 
 
 def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:

@@ -24,8 +24,10 @@ from surefix.types import ByteArray, FloatArray, IntArray
 
 __all__ = ["TYPES", "decode"]
 
-TYPES = ("GGA", "GNS", "RMC", "GLL", "VTG", "HDT", "HDM", "THS", "HDG", "VHW", "DPT", "DBT")
-TYPES = (*TYPES, "ZDA", "GST")
+TYPES = (
+    *("GGA", "GNS", "RMC", "GLL", "VTG", "HDT", "HDM"),
+    *("THS", "HDG", "VHW", "DPT", "DBT", "ZDA", "GST"),
+)
 """Sentence types that are read here, by their code."""
 
 _GGA, _GNS, _RMC, _GLL, _VTG, _HDT, _HDM, _THS, _HDG, _VHW, _DPT, _DBT, _ZDA, _GST = range(14)
@@ -42,7 +44,7 @@ def decode(code: int, data: ByteArray, comma: IntArray, commas: int, v: FloatArr
     """
     if commas < _FIELDS[code]:
         return False
-    if code == _GGA or code == _GNS:
+    if code in (_GGA, _GNS):
         return _gga(code, data, comma, v)
     if code == _RMC:
         return _rmc(data, comma, commas, v)
@@ -58,7 +60,7 @@ def decode(code: int, data: ByteArray, comma: IntArray, commas: int, v: FloatArr
         return _zda(data, comma, v)
     if code == _GST:
         return _gst(data, comma, v)
-    if code == _DPT or code == _DBT:
+    if code in (_DPT, _DBT):
         return _depth(code, data, comma, v)
     return _heading(code, data, comma, v)
 
@@ -77,7 +79,7 @@ def _letter(data: ByteArray, comma: IntArray, i: int) -> int:
 def _mark(data: ByteArray, comma: IntArray, i: int, one: int) -> bool:
     """Whether a field is empty or one certain letter."""
     c = _letter(data, comma, i)
-    return c == 0 or c == one
+    return c in (0, one)
 
 
 @helper
@@ -93,7 +95,7 @@ def _place(data: ByteArray, comma: IntArray, i: int, valid: bool, v: FloatArray)
     a, b = comma[i] + 1, comma[i + 1]
     latitude = degrees(data, a, b, _letter(data, comma, i + 1), True)
     longitude = degrees(data, comma[i + 2] + 1, comma[i + 3], _letter(data, comma, i + 3), False)
-    if latitude == DECLINED or longitude == DECLINED:
+    if DECLINED in (latitude, longitude):
         return False
     missing = np.isnan(latitude) or np.isnan(longitude)
     if valid and missing:
@@ -140,14 +142,14 @@ def _rmc(data: ByteArray, comma: IntArray, commas: int, v: FloatArray) -> bool:
     if commas > 11:
         side = _letter(data, comma, 10)
         mode = _mode(data, comma, commas, 11)
-        if mode < 0 or not (side == 0 or side == _E or side == _W):
+        if mode < 0 or not (side == 0 or side in (_E, _W)):
             return False
     valid = status == _A and mode != _N
-    if v[0] == DECLINED or not (valid or status == _A or status == _V):
+    if v[0] == DECLINED or not (valid or status in (_A, _V)):
         return False
     speed, course = _number(data, comma, 6, False), _number(data, comma, 7, False)
     day = _date(data, comma[8] + 1, comma[9])
-    if speed == DECLINED or course == DECLINED or day == DECLINED:
+    if DECLINED in (speed, course, day):
         return False
     plain = _place(data, comma, 2, valid, v)
     v[8] = day
@@ -178,7 +180,7 @@ def _gll(data: ByteArray, comma: IntArray, commas: int, v: FloatArray) -> bool:
         v[0] = time_of_day(data, comma[4] + 1, comma[5])
     if commas > 5:
         status, mode = _letter(data, comma, 5), _mode(data, comma, commas, 6)
-    if v[0] == DECLINED or mode < 0 or not (status == 0 or status == _A or status == _V):
+    if v[0] == DECLINED or mode < 0 or not (status == 0 or status in (_A, _V)):
         return False
     return _place(data, comma, 0, status != _V and mode != _N, v)
 
@@ -193,7 +195,7 @@ def _vtg(data: ByteArray, comma: IntArray, commas: int, v: FloatArray) -> bool:
     v[0], v[1] = (kmh * KMH if np.isnan(knots) else knots * KNOT), course
     if mode == _N:
         v[0], v[1] = np.nan, np.nan
-    return plain and knots != DECLINED and kmh != DECLINED and not course > 360.0
+    return plain and DECLINED not in (knots, kmh) and not course > 360.0
 
 
 @helper
@@ -201,12 +203,12 @@ def _heading(code: int, data: ByteArray, comma: IntArray, v: FloatArray) -> bool
     heading, side = _number(data, comma, 0, False), _letter(data, comma, 1)
     v[0], v[1] = heading, np.nan
     if code == _HDT:
-        plain = side == 0 or side == _T
+        plain = side in (0, _T)
     elif code == _HDM:
-        plain = side == 0 or side == _M
+        plain = side in (0, _M)
         v[0], v[1] = np.nan, heading
     else:
-        plain = side == 0 or side == _A or side == _E or side == _M or side == _S or side == _V
+        plain = side == 0 or side in (_A, _E, _M, _S, _V)
         v[0] = np.nan if side == _V else heading
     return plain and not heading > 360.0
 
@@ -215,7 +217,7 @@ def _heading(code: int, data: ByteArray, comma: IntArray, v: FloatArray) -> bool
 def _signed(data: ByteArray, comma: IntArray, i: int) -> float:
     """Deviation or variation and its side, east positive."""
     value, side = _number(data, comma, i, False), _letter(data, comma, i + 1)
-    if not (side == 0 or side == _E or side == _W) or value > 180.0:
+    if not (side == 0 or side in (_E, _W)) or value > 180.0:
         return DECLINED
     return np.nan if side == 0 else -value if side == _W else value
 
@@ -224,7 +226,7 @@ def _signed(data: ByteArray, comma: IntArray, i: int) -> float:
 def _hdg(data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
     heading = _number(data, comma, 0, False)
     deviation, variation = _signed(data, comma, 1), _signed(data, comma, 3)
-    if heading > 360.0 or deviation == DECLINED or variation == DECLINED:
+    if heading > 360.0 or DECLINED in (deviation, variation):
         return False
     if not np.isnan(deviation):
         heading = (heading + deviation) % 360.0
@@ -242,7 +244,7 @@ def _vhw(data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
     plain = plain and _mark(data, comma, 5, _N) and _mark(data, comma, 7, _K)
     v[0], v[1], v[2] = (kmh * KMH if np.isnan(knots) else knots * KNOT), true, magnetic
     plain = plain and not true > 360.0 and not magnetic > 360.0
-    return plain and knots != DECLINED and kmh != DECLINED
+    return plain and DECLINED not in (knots, kmh)
 
 
 @helper
@@ -250,12 +252,12 @@ def _depth(code: int, data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
     if code == _DPT:
         depth, offset = _number(data, comma, 0, False), _number(data, comma, 1, True)
         v[0] = depth + (offset if offset > 0.0 else 0.0)
-        return depth != DECLINED and offset != DECLINED
+        return DECLINED not in (depth, offset)
     feet, metres = _number(data, comma, 0, False), _number(data, comma, 2, False)
     fathoms = _number(data, comma, 4, False)
     plain = _mark(data, comma, 1, _F[0]) and _mark(data, comma, 3, _F[1])
     plain = plain and _mark(data, comma, 5, _F[2])
-    plain = plain and feet != DECLINED and metres != DECLINED and fathoms != DECLINED
+    plain = plain and DECLINED not in (feet, metres, fathoms)
     v[0] = FOOT * (6.0 * fathoms if np.isnan(feet) else feet) if np.isnan(metres) else metres
     return plain
 
@@ -272,7 +274,7 @@ def _zda(data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
         v[1] = day_of(year, month, day)
     elif sizes != (0, 0, 0):
         return False
-    return v[0] != DECLINED and v[1] != DECLINED
+    return DECLINED not in (v[0], v[1])
 
 
 @helper
@@ -283,7 +285,7 @@ def _gst(data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
         _number(data, comma, 6, False),
         _number(data, comma, 7, False),
     )
-    if v[0] == DECLINED or north == DECLINED or east == DECLINED or up == DECLINED:
+    if DECLINED in (v[0], north, east, up):
         return False
     v[1] = np.nan if east == 0.0 else east
     v[2] = np.nan if north == 0.0 else north

@@ -147,7 +147,7 @@ class Epochs:
         self._values, self._marks = array("d"), array("q")  # row after row
 
     def _find(self, name: str, kind: str, second: float, received: float) -> _Row | None:
-        timed = second == second  # not NaN
+        timed = not isnan(second)
         for row in reversed(self._open):
             if row.source != name:
                 continue

@@ -35,7 +35,7 @@ def digits(data: ByteArray, a: int, b: int) -> int:
         return -1
     value = 0
     for k in range(a, b):
-        c = np.int64(data[k]) - _ZERO
+        c = int(np.int64(data[k])) - _ZERO
         if c < 0 or c > 9:
             return -1
         value = 10 * value + c
@@ -58,7 +58,7 @@ def decimal(data: ByteArray, a: int, b: int, signed: bool) -> float:
         return DECLINED
     value = 0
     for k in range(a, b):
-        c = np.int64(data[k]) - _ZERO
+        c = int(np.int64(data[k])) - _ZERO
         if k == point:
             continue
         if c < 0 or c > 9:
@@ -66,14 +66,14 @@ def decimal(data: ByteArray, a: int, b: int, signed: bool) -> float:
         value = 10 * value + c
     if value > _EXACT:
         return DECLINED
-    number = value / _SCALE[places]
+    number = float(value / _SCALE[places])
     return -number if signed and negative else number
 
 
 @helper
 def letter(data: ByteArray, a: int, b: int) -> int:
     """The only byte of a field; 0 where it is empty, 255 where there are more."""
-    return 0 if a == b else np.int64(data[a]) if b - a == 1 else 255
+    return 0 if a == b else int(np.int64(data[a])) if b - a == 1 else 255
 
 
 @helper
@@ -103,7 +103,7 @@ def degrees(data: ByteArray, a: int, b: int, side: int, latitude: bool) -> float
     """``ddmm.mmm`` of a latitude or ``dddmm.mmm`` of a longitude, deg; ``side`` is its letter."""
     width, limit = (2, 90.0) if latitude else (3, 180.0)
     plus, minus = (78, 83) if latitude else (69, 87)
-    if side != plus and side != minus:
+    if side not in (plus, minus):
         return np.nan if a == b and side == 0 else DECLINED
     if a == b:
         return np.nan

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -26,12 +27,13 @@ from surefix.io.nmea_record import (
     WaterSpeed,
 )
 from surefix.io.nmea_scan import DECLINED, UNKNOWN, Lines, scan
+from surefix.types import IntArray
 
 __all__ = ["Plain", "pieces"]
 
 _MOST = 1000  # addresses that are remembered
 _UNKNOWN: dict[bytes, bool] = {}  # whether `parse` does not know an address either
-_Values = list[float]
+_Values = tuple[float, ...]
 
 
 class Plain(NamedTuple):
@@ -39,14 +41,17 @@ class Plain(NamedTuple):
 
     Parameters
     ----------
+    total
+        How many records there are.
     records
         Of each line its number, from 1, its time of reception, s, NaN if it has none, and what its
-        sentence says. Lines of unknown types are left out.
+        sentence says, made when it is asked for. Lines of unknown types are left out.
     unknown
         How many sentences there are of each unknown type.
     """
 
-    records: list[tuple[int, float, Record]]
+    total: int
+    records: Iterator[tuple[int, float, Record]]
     unknown: dict[str, int]
 
 
@@ -54,7 +59,7 @@ def pieces(state: Framing, data: bytes) -> Iterator[tuple[Framing, Plain | list[
     r"""Lines that the next bytes of a log complete, and each time the state to go on with.
 
     >>> (_, found), _ = pieces(Framing(), b"$HEHDT,218.53,T*12\r\n")
-    >>> found.records
+    >>> list(found.records)
     [(1, nan, Heading(talker='HE', type='HDT', true=218.53, magnetic=nan))]
     """
     if state.skipping:
@@ -103,27 +108,32 @@ def _is_unknown(address: bytes, data: bytes, lines: Lines, k: int) -> bool:
 
 def _plain(data: bytes, lines: Lines, a: int, b: int, number: int) -> Plain:
     rows = np.flatnonzero(lines.code[a:b] >= 0) + a
-    records = []
-    for line, code, (begin, end), received, values in zip(
-        (rows - a + number).tolist(),
+    others = lines.address[a:b][lines.code[a:b] == UNKNOWN].tolist()
+    addresses = Counter(data[begin:end].decode() for begin, end in others)
+    unknown: Counter[str] = Counter()
+    for address, count in addresses.items():
+        unknown[address if address[0] == "P" else address[2:]] += count
+    return Plain(len(rows), _records(data, lines, rows, number - a), unknown)
+
+
+def _records(
+    data: bytes, lines: Lines, rows: IntArray, first: int
+) -> Iterator[tuple[int, float, Record]]:
+    columns = (column.tolist() for column in lines.values[rows].T)
+    for line, code, begin, received, values in zip(
+        (rows + first).tolist(),
         lines.code[rows].tolist(),
-        lines.address[rows].tolist(),
+        lines.address[rows, 0].tolist(),
         lines.received[rows].tolist(),
-        lines.values[rows].tolist(),
+        zip(*columns, strict=True),
         strict=True,
     ):
-        address = data[begin:end].decode()
-        records.append((line, received, _BUILD[code](address[:2], address[2:], values)))
-    others = lines.address[a:b][lines.code[a:b] == UNKNOWN].tolist()
-    unknown = Counter(data[begin:end].decode() for begin, end in others)
-    kinds: Counter[str] = Counter()
-    for address, count in unknown.items():
-        kinds[address if address[0] == "P" else address[2:]] += count
-    return Plain(records, kinds)
+        talker = data[begin : begin + 2].decode()
+        yield line, received, _BUILD[code](talker, TYPES[code], values)
 
 
 def _day(value: float) -> int | None:
-    return int(value) if value == value else None
+    return None if isnan(value) else int(value)
 
 
 def _position(talker: str, kind: str, v: _Values) -> Position:

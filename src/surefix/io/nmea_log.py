@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -122,12 +123,10 @@ def read_nmea(
     try:
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
-                for state, found in pieces(state, block):
-                    if isinstance(found, Plain):
-                        reader.count(found.unknown)
-                    some = found.records if isinstance(found, Plain) else found
-                    for at in range(0, len(some), step):
-                        reader.add(some[at : at + step])
+                for after, found in pieces(state, block):
+                    state = after
+                    for _ in range(0, reader.begin(found), step):
+                        reader.add(step)
                         if reader.size >= chunk_fixes:
                             yield reader.chunk()
                             given += 1
@@ -136,7 +135,7 @@ def read_nmea(
                     progress(done)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", "a readable file") from error
-    reader.add(finish(state))
+    reader.add(reader.begin(finish(state)))
     rest = reader.chunk(last=True)
     if not given or rest.fixes or rest.channels or rest.problems or rest.counts:
         yield rest
@@ -179,6 +178,7 @@ class NmeaStream:
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
+        self._coming: Iterator[Frame | tuple[int, float, Record]] = iter(())
         self._reported: set[str] = set()
         self._line = 0
         self._take: dict[type, Callable[..., bool | None]] = {
@@ -225,30 +225,42 @@ class NmeaStream:
         """
         self._arrival = arrival
         self._framing, frames = frame(self._framing, data)
-        self.add(frames)
+        self._read(frames)
         if self._clock.dated or self.size >= _UNDATED:
             return self.chunk()
         return Log(source=str(self._path))
 
     def rest(self) -> Log:
         """Read the line without an end, if there is one, and give all rows."""
-        self.add(finish(self._framing))
+        self._read(finish(self._framing))
         self._framing = START
         return self.chunk(last=True)
 
-    def count(self, unknown: Mapping[str, int]) -> None:
-        """Count sentences of unknown types."""
-        for kind, count in unknown.items():
-            self._counts[kind] = self._counts.get(kind, 0) + count
+    def _read(self, frames: list[Frame]) -> None:
+        self.add(self.begin(frames))
+        self._coming = iter(())
 
-    def add(self, found: Sequence[Frame | tuple[int, float, Record]]) -> None:
-        """Read the next frames, or the records of the next plain lines."""
-        for item in found:
-            if len(item) == 3:
+    def begin(self, found: Plain | list[Frame]) -> int:
+        """Take the next piece of the log; gives how many records or frames are in it."""
+        if not isinstance(found, Plain):
+            self._coming = iter(found)
+            return len(found)
+        self._count(found.unknown)
+        self._coming = found.records
+        return found.total
+
+    def add(self, most: int) -> None:
+        """Read so many records or frames of the piece, or what is left of it."""
+        for item in islice(self._coming, most):
+            if isinstance(item, Frame):
+                self._add(item)
+            else:
                 self._line, self._clock.receive, record = item
                 self._heed(record)
-            else:
-                self._add(item)
+
+    def _count(self, unknown: Mapping[str, int]) -> None:
+        for kind, count in unknown.items():
+            self._counts[kind] = self._counts.get(kind, 0) + count
 
     def _add(self, item: Frame) -> None:
         line, prefix, text, problem = item
@@ -271,7 +283,7 @@ class NmeaStream:
             if self._heed(record) is False:
                 self._problem("other-target", line, text)
         elif record.kind == "unknown-type":
-            self.count({record.text: 1})
+            self._count({record.text: 1})
         else:
             self._problem(record.kind, line, text)
 

@@ -1,8 +1,8 @@
 """Plain lines of an NMEA log, many at a time: found, checked and read by one kernel.
 
-A line is plain if it holds one sentence, alone or behind a time of reception, with a right checksum,
-of a type that is read here or that is not known at all, and if every field has its usual form.
-Nearly all lines are. Whatever is not is *declined*: `surefix.io.nmea_frame` and
+A line is plain if it holds one sentence, alone or behind a time of reception, with a right
+checksum, of a type that is read here or that is not known at all, and if every field has its usual
+form. Nearly all lines are. Whatever is not is *declined*: `surefix.io.nmea_frame` and
 `surefix.io.nmea.parse` say what it is. They define how a log is read; a plain line gives the record
 that they would give.
 """
@@ -123,13 +123,13 @@ def _sentence(data: ByteArray, begin: int, end: int, comma: IntArray) -> tuple[i
         return -1, 0
     start, commas, check = -1, 0, 0
     for k in range(begin, star):
-        c = np.int64(data[k])
+        c = int(np.int64(data[k]))
         if c == _DOLLAR:
             if start >= 0:
                 return -1, 0
             start = k
             continue
-        if c == _BANG or c == _STAR or c == _RETURN or c > 127:
+        if c in (_BANG, _STAR, _RETURN) or c > 127:
             return -1, 0
         if start >= 0:
             check ^= c
@@ -145,7 +145,7 @@ def _sentence(data: ByteArray, begin: int, end: int, comma: IntArray) -> tuple[i
 @helper
 def _hex(c: int) -> int:
     """Value of a hexadecimal digit; far too much for another byte."""
-    c = np.int64(c)
+    c = int(np.int64(c))
     if 48 <= c <= 57:
         return c - 48
     c &= ~32
@@ -158,13 +158,16 @@ def _address(data: ByteArray, a: int, b: int) -> int:
     if b - a < 4 or (data[a] != _P and b - a != 5):
         return -1
     for k in range(a, b):
-        c = np.int64(data[k])
+        c = int(np.int64(data[k]))
         capital = 65 <= c <= 90
         if not capital and (k == a or not 48 <= c <= 57):
             return -1
     if data[a] == _P:
         return 0
-    return (np.int64(data[a + 2]) << 16) + (np.int64(data[a + 3]) << 8) + np.int64(data[a + 4])
+    name = 0
+    for k in range(a + 2, b):
+        name = 256 * name + int(np.int64(data[k]))
+    return name
 
 
 @helper

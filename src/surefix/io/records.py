@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -75,14 +75,14 @@ def parts(batch: Batch, rows: int) -> Iterator[Batch]:
     """Cut a batch into parts of so many epochs, so that little of it is in words at one time."""
     for at in range(0, max(len(batch.track.time), 1), rows):
         some = slice(at, at + rows)
-        yield Batch._make(
-            value[some]
-            if isinstance(value, np.ndarray)
-            else value._make(None if column is None else column[some] for column in value)
-            if isinstance(value, Track | Verdicts)
-            else value
-            for value in batch
-        )
+        yield Batch._make(_cut(value, some) for value in batch)
+
+
+def _cut(value: Any, some: slice) -> Any:
+    """Some epochs of a field; names of sensors stay."""
+    if isinstance(value, Track | Verdicts):
+        return type(value)(*(_cut(column, some) for column in value))
+    return value[some] if isinstance(value, np.ndarray) else value
 
 
 def table(batch: Batch, form: Form) -> pa.Table:

@@ -206,7 +206,7 @@ def _parquet(
     size = path.stat().st_size
 
     def logs() -> Iterator[Log]:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(path, pre_buffer=False) as file:  # else what was read is kept
             batches = file.iter_batches(_ROWS, columns=[names[i] for i in wanted])
             while True:
                 with _parquet_errors(path):

@@ -45,7 +45,10 @@ def _in_time(events: Iterable[Event]) -> tuple[Event, ...]:
 
 
 def thinned(cleaned: Cleaned, every: int) -> Cleaned:
-    """Keep one row of ``every``, of fixes, regular times and series alike."""
+    """Keep one row of ``every``, of fixes, regular times and series alike.
+
+    All are copied: a part of an array would keep the whole of it alive.
+    """
     if every == 1:
         return cleaned
     some = slice(None, None, every)
@@ -53,18 +56,18 @@ def thinned(cleaned: Cleaned, every: int) -> Cleaned:
         cleaned,
         track=_some_track(cleaned.track, some),
         verdicts=_some_verdicts(cleaned.verdicts, some),
-        raw_position=cleaned.raw_position[some],
-        raw_coordinates=cleaned.raw_coordinates[some],
-        sensor=cleaned.sensor[some],
-        row=cleaned.row[some],
+        raw_position=cleaned.raw_position[some].copy(),
+        raw_coordinates=cleaned.raw_coordinates[some].copy(),
+        sensor=cleaned.sensor[some].copy(),
+        row=cleaned.row[some].copy(),
         resampled=None if cleaned.resampled is None else _some_track(cleaned.resampled, some),
         channels=tuple(
             channel._replace(
-                time=channel.time[some],
-                raw=channel.raw[some],
-                value=channel.value[some],
-                rate=channel.rate[some],
-                sigma=channel.sigma[some],
+                time=channel.time[some].copy(),
+                raw=channel.raw[some].copy(),
+                value=channel.value[some].copy(),
+                rate=channel.rate[some].copy(),
+                sigma=channel.sigma[some].copy(),
                 verdicts=_some_verdicts(channel.verdicts, some),
             )
             for channel in cleaned.channels

@@ -24,12 +24,12 @@ from surefix.io.nmea_scan import scan
 from surefix.io.table import from_frame
 from surefix.jit import compilations
 from surefix.pipelines.clean import Source, clean_sources
-from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.options import CleanOptions, Mode
 
 __all__ = ["PARTS", "compile_part", "warm_up"]
 
 _ROWS = 60
-_MODES = ("realtime", "lagged", "offline")
+_MODES: tuple[Mode, ...] = ("realtime", "lagged", "offline")
 
 
 def warm_up(told: Callable[[str, int], None], *, processes: int | None = None) -> int:
@@ -124,7 +124,7 @@ PARTS: dict[str, Callable[[], None]] = {
 """What can be compiled side by side, the longest first."""
 
 
-def _clean(method: str, modes: tuple[str, ...] = _MODES) -> None:
+def _clean(method: str, modes: tuple[Mode, ...] = _MODES) -> None:
     random = np.random.default_rng(1)
     time = np.arange(float(_ROWS))
     x, y, z = random.normal(0.0, 0.5, (3, _ROWS)) + 0.5 * time
