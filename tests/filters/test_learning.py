@@ -131,12 +131,12 @@ def test_errors_of_one_axis_are_not_taken_for_errors_of_all():
 
 
 def test_rows_of_wrong_fixes_are_counted():
-    """After two that are wrong: certain in a burst, by chance elsewhere."""
+    """After two that are wrong: as often as may be in a burst, by chance elsewhere."""
     rows = {
         name: learnt(trial_of(name, "alone", 1)).prior.row
         for name in ("burst-independent", "burst-common", "isolated-40", "clean")
     }
-    assert rows["burst-independent"] > 0.75
+    assert rows["burst-independent"] == 0.5  # never more
     assert rows["isolated-40"] == pytest.approx(0.4, abs=0.1)
     assert rows["burst-common"] < 0.5
     assert rows["clean"] == pytest.approx(0.3, abs=0.05)
