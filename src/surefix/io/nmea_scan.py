@@ -154,7 +154,7 @@ def _hex(c: int) -> int:
 
 @helper
 def _address(data: ByteArray, a: int, b: int) -> int:
-    """Type of an address as a number of three bytes, 0 of a proprietary one, which is declined; −1 is no address."""
+    """Type of an address, a number of three bytes; 0: proprietary, declined; −1: no address."""
     if b - a < 4 or (data[a] != _P and b - a != 5):
         return -1
     for k in range(a, b):
