@@ -35,7 +35,7 @@ from surefix.pipelines.judge import (
 )
 from surefix.pipelines.latency import Late, find_late, in_time, late_events
 from surefix.pipelines.observe import epochs_of, grid_times, padded, status_of, steady
-from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.options import HEAD, CleanOptions
 from surefix.pipelines.present import nothing, pick, settings, track_of
 from surefix.pipelines.rows import Chunk, Rows, Source, join_rows, merged, take_rows
 from surefix.pipelines.setup import Setup, localise, settle
@@ -52,21 +52,31 @@ from surefix.types import (
     Verdicts,
 )
 
-__all__ = ["HEAD", "Estimator", "clean_batches", "clean_sources"]
+__all__ = [
+    "HEAD",
+    "Estimator",
+    "Session",
+    "advance",
+    "clean_batches",
+    "clean_sources",
+    "finish",
+]
 
 Estimator = Callable[[Motion, Recovery, Epochs, object], tuple[object, Estimate]]
 """Estimates a series in the place of the method: takes and gives what it remembers, None at first.
 
 What it gets is prepared as for the method that the options name, and judged in the same way.
 """
-HEAD = 20_000
-"""Rows that a log is settled on in real time; the other modes see it whole."""
-_PORTION = 50_000  # rows cleaned at a time in real time; at least HEAD
+_PORTION = 50_000  # rows cleaned at a time in real time; at least those it is settled on
 
 
 @dataclass
-class _Session:
-    """What is carried from batch to batch."""
+class Session:
+    """What is carried from batch to batch: the estimator's state, and rows too few to begin with.
+
+    It holds plain records only and can be stored and gone on from later, as
+    `surefix.pipelines.stream` does; ``options`` and ``names`` (of the sources) begin it.
+    """
 
     options: CleanOptions
     estimator: Estimator | None = None
@@ -84,6 +94,10 @@ class _Session:
     names: tuple[str, ...] = ()
     has_depth: bool = False
     held: int = 0
+    waiting: list[Chunk] = field(default_factory=list)
+    rows: int = 0  # that wait
+    problems: list[Problem] = field(default_factory=list)  # as long as there is nothing else
+    anything: bool = False
 
 
 def clean_sources(
@@ -113,21 +127,44 @@ def clean_batches(
         There is nothing to clean: no fix, no series.
     """
     inputs = list(sources)
-    session = _Session(options, estimator, names=tuple(source.name for source in inputs))
-    waiting: list[Chunk] = []
-    problems: list[Problem] = []
-    rows, anything = 0, False
+    session = Session(options, estimator, names=tuple(source.name for source in inputs))
     for chunk in merged(inputs, session.sensors, options.reorder_s, options.sensor_delay_s):
-        waiting.append(chunk)
-        problems += chunk.problems
-        anything = anything or chunk.rows is not None or bool(chunk.channels)
-        rows += len(chunk.rows.tau) if chunk.rows is not None else 0
-        if options.mode == "realtime" and rows >= (1 if session.setup else HEAD):
-            yield from _batches(session, waiting, final=False)
-            waiting, rows = [], 0
-    if not anything:
-        raise _nothing_found(session.names, problems)
-    yield from _batches(session, waiting, final=True)
+        yield from advance(session, chunk)
+    yield from finish(session)
+
+
+def advance(session: Session, chunk: Chunk) -> Iterator[Cleaned]:
+    """Take what was read next, and clean it if the mode and the number of rows allow it.
+
+    Parameters
+    ----------
+    session
+        What came before; goes on.
+    chunk
+        Rows in their order, and what came beside them.
+    """
+    options = session.options
+    session.waiting.append(chunk)
+    session.rows += len(chunk.rows.tau) if chunk.rows is not None else 0
+    session.anything = session.anything or chunk.rows is not None or bool(chunk.channels)
+    session.problems = [] if session.anything else [*session.problems, *chunk.problems]
+    enough = 1 if session.setup else options.settle_rows
+    if options.mode == "realtime" and session.rows >= enough:
+        waiting, session.waiting, session.rows = session.waiting, [], 0
+        yield from _batches(session, waiting, final=False)
+
+
+def finish(session: Session) -> Iterator[Cleaned]:
+    """Clean what is left when nothing more comes.
+
+    Raises
+    ------
+    InputError
+        There is nothing to clean: no fix, no series.
+    """
+    if not session.anything:
+        raise _nothing_found(session.names, session.problems)
+    yield from _batches(session, session.waiting, final=True)
 
 
 def _nothing_found(names: tuple[str, ...], problems: list[Problem]) -> InputError:
@@ -141,14 +178,15 @@ def _nothing_found(names: tuple[str, ...], problems: list[Problem]) -> InputErro
     )
 
 
-def _batches(session: _Session, chunks: list[Chunk], *, final: bool) -> Iterator[Cleaned]:
+def _batches(session: Session, chunks: list[Chunk], *, final: bool) -> Iterator[Cleaned]:
     """Clean what was read, in real time in portions of bounded size."""
     parts = [chunk.rows for chunk in chunks if chunk.rows is not None]
     rows = join_rows(parts) if parts else None
     portions: list[Rows | None] = [rows]
-    if session.options.mode == "realtime" and rows is not None and len(rows.tau) > _PORTION:
-        starts = range(0, len(rows.tau), _PORTION)
-        portions = [take_rows(rows, slice(at, at + _PORTION)) for at in starts]
+    most = max(_PORTION, session.options.settle_rows)
+    if session.options.mode == "realtime" and rows is not None and len(rows.tau) > most:
+        starts = range(0, len(rows.tau), most)
+        portions = [take_rows(rows, slice(at, at + most)) for at in starts]
     yield _batch(session, portions[0], chunks, final=final)
     for portion in portions[1:]:
         yield _batch(session, portion, [], final=False)
@@ -158,7 +196,7 @@ def _batches(session: _Session, chunks: list[Chunk], *, final: bool) -> Iterator
         yield replace(empty, sources=session.names, events=(Event("held", np.nan, text),))
 
 
-def _batch(session: _Session, rows: Rows | None, chunks: list[Chunk], *, final: bool) -> Cleaned:
+def _batch(session: Session, rows: Rows | None, chunks: list[Chunk], *, final: bool) -> Cleaned:
     """Clean one portion of rows, and the series that came with ``chunks``."""
     events = [event for chunk in chunks for event in chunk.events]
     series: dict[tuple[str, str], list[Channel]] = {}
@@ -181,7 +219,7 @@ def _batch(session: _Session, rows: Rows | None, chunks: list[Chunk], *, final: 
 
 
 def _clean_channels(
-    session: _Session, series: dict[tuple[str, str], list[Channel]], *, final: bool
+    session: Session, series: dict[tuple[str, str], list[Channel]], *, final: bool
 ) -> tuple[CleanedChannel, ...]:
     """Clean the series of a batch; one that just begins waits until there is enough to settle."""
     for key, parts in series.items():
@@ -203,7 +241,7 @@ def _clean_channels(
     return tuple(out)
 
 
-def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
+def _clean_rows(session: Session, rows: Rows, events: list[Event]) -> Cleaned:
     """Filter a batch of rows; what is settled with the first batch is added to ``events``."""
     options = session.options
     tau = steady(rows.tau, session.last_tau)
@@ -287,7 +325,7 @@ def _clean_rows(session: _Session, rows: Rows, events: list[Event]) -> Cleaned:
     )
 
 
-def _delayed(session: _Session, setup: Setup, rows: Rows, usable: BoolArray) -> tuple[Late, ...]:
+def _delayed(session: Session, setup: Setup, rows: Rows, usable: BoolArray) -> tuple[Late, ...]:
     """Sensors that are late against a velocity, as far as the options ask for it."""
     if session.options.latency == "ignore":
         return ()
@@ -295,7 +333,7 @@ def _delayed(session: _Session, setup: Setup, rows: Rows, usable: BoolArray) -> 
     return find_late(rows, usable, position, velocity, session.sensors)
 
 
-def _without_delay(session: _Session, late: tuple[Late, ...]) -> _Session:
+def _without_delay(session: Session, late: tuple[Late, ...]) -> Session:
     """Go back to where nothing was settled; the delays are known now."""
     known = dict(session.options.sensor_delay_s)
     for each in late:
@@ -313,7 +351,7 @@ def _all_axes(judged: Verdicts, axes: tuple[int, ...]) -> Verdicts:
     return judged._replace(standardised=wide, offset=offset)
 
 
-def _repeats(session: _Session, rows: Rows) -> Repeats:
+def _repeats(session: Session, rows: Rows) -> Repeats:
     fixes = rows.fixes
     if session.repeats is None:
         head, sensors = _head(session.options), len(session.sensors)
@@ -330,10 +368,10 @@ def _repeats(session: _Session, rows: Rows) -> Repeats:
 
 def _head(options: CleanOptions) -> slice:
     """The rows of the first batch that a log is settled on."""
-    return slice(HEAD if options.mode == "realtime" else None)
+    return slice(options.settle_rows if options.mode == "realtime" else None)
 
 
-def _without_idle(session: _Session, rows: Rows) -> Rows:
+def _without_idle(session: Session, rows: Rows) -> Rows:
     """Rows without the axes that carry no information."""
     if session.idle is None or not session.idle.any():
         return rows
@@ -342,7 +380,7 @@ def _without_idle(session: _Session, rows: Rows) -> Rows:
     return rows._replace(fixes=rows.fixes._replace(position=position))
 
 
-def _idle_events(session: _Session, *, geographic: bool) -> list[Event]:
+def _idle_events(session: Session, *, geographic: bool) -> list[Event]:
     if session.idle is None:
         return []
     names = ("latitude", "longitude", "height") if geographic else ("axis x", "axis y", "axis z")
@@ -356,7 +394,7 @@ def _idle_events(session: _Session, *, geographic: bool) -> list[Event]:
     ]
 
 
-def _grid(session: _Session, setup: Setup, tau: FloatArray) -> FloatArray:
+def _grid(session: Session, setup: Setup, tau: FloatArray) -> FloatArray:
     """Regular times that are due in this batch: whole multiples of the step."""
     every = session.options.every_s
     if every is None:

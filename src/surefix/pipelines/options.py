@@ -13,11 +13,21 @@ from surefix.filters.deciding import AHEAD, THRESHOLDS, Decider
 from surefix.models.motion import MODELS
 from surefix.robust.loss import LOSSES, Loss, loss_named
 
-__all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Latency", "Mode", "options_from"]
+__all__ = [
+    "HEAD",
+    "METHODS",
+    "MULTI_HYPOTHESIS",
+    "CleanOptions",
+    "Latency",
+    "Mode",
+    "options_from",
+]
 
 Mode = Literal["realtime", "lagged", "offline"]
 Latency = Literal["report", "remove", "ignore"]
 
+HEAD = 20_000
+"""Rows that a log is settled on in real time, unless the options say otherwise."""
 MULTI_HYPOTHESIS = "multi-hypothesis"
 _CIPRA_ROMERA = "cipra-romera"
 METHODS = (MULTI_HYPOTHESIS, *LOSSES, _CIPRA_ROMERA, *THRESHOLDS)
@@ -73,6 +83,9 @@ class CleanOptions:
         also takes the delay off their times (not in real time), ``ignore`` does not look.
     held
         Count a position that is polled again only once.
+    settle_rows
+        Rows of all sensors, from the first on, that frame, noise and model are settled on in real
+        time; the other modes see the whole log.
     """
 
     mode: Mode = "offline"
@@ -93,6 +106,7 @@ class CleanOptions:
     reorder_s: float = 10.0
     latency: Latency = "report"
     held: bool = True
+    settle_rows: int = HEAD
 
     def __post_init__(self) -> None:
         _one_of("mode", self.mode, get_args(Mode))
@@ -140,7 +154,15 @@ class CleanOptions:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
         if not isinstance(self.held, bool):
             raise OptionsError(f"held = {self.held!r}", "true or false")
+        if type(self.settle_rows) is not int or self.settle_rows < 2:
+            raise OptionsError(f"settle_rows = {self.settle_rows!r}", "a whole number from 2 on")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let processes exchange options: their mappings travel as plain ones."""
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        plain = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
+        return options_from, (plain,)
 
     @property
     def loss(self) -> Loss:

@@ -25,6 +25,7 @@ __all__ = [
     "join_fixes",
     "join_rows",
     "merged",
+    "pushed",
     "take_fixes",
     "take_rows",
 ]
@@ -149,6 +150,22 @@ def merged(
         yield chunk._replace(rows=rows)
         if not reading:
             return
+
+
+def pushed(
+    source: Source,
+    log: Log | None,
+    sensors: list[str],
+    reorder_s: float,
+    delay_s: Mapping[str, float],
+) -> Chunk:
+    """Take the next part of a single source, None at its end, and give the rows that are ready.
+
+    The other arguments are those of `merged`.
+    """
+    source.logs = iter(() if log is None else (log,))
+    chunk = _advance(source, sensors, reorder_s, delay_s)
+    return chunk._replace(rows=_release([source]))
 
 
 def _advance(
