@@ -86,9 +86,7 @@ def end(stream: Stream) -> Iterator[Cleaned]:
 
 def _advance(stream: Stream, log: Log | None) -> Iterator[Cleaned]:
     session, options = stream.session, stream.session.options
-    chunk = pushed(
-        stream.source, log, session.sensors, options.reorder_s, options.sensor_delay_s
-    )
+    chunk = pushed(stream.source, log, session.sensors, options.reorder_s, options.sensor_delay_s)
     yield from advance(session, chunk)
 
 
