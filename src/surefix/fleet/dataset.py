@@ -170,8 +170,8 @@ def _runs_of(
                 at += len(column)
         except (OSError, pa.ArrowException) as error:
             raise _unsound(path, error) from error
-    counts: IntArray = np.diff(np.concatenate(ends))
-    return total, pa.concat_arrays(values), counts
+    bounds: IntArray = np.concatenate(ends)
+    return total, pa.concat_arrays(values), bounds[1:] - bounds[:-1]
 
 
 def units(data: DataSet) -> list[Unit]:
