@@ -43,8 +43,12 @@ def fleet(
     options: Annotated[Path | None, typer.Option(help="TOML file with options of clean.")] = None,
     column: Columns = None,
     track: Annotated[
-        str, typer.Option(metavar="COLUMN", help="Says which track a row of a data set belongs to.")
-    ] = "track_id",
+        str | None,
+        typer.Option(
+            metavar="COLUMN",
+            help="Says which track a row of a data set belongs to; default track_id.",
+        ),
+    ] = None,
     depth: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Name of the depth log in the folder of each log."),

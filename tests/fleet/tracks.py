@@ -15,7 +15,7 @@ def track(name, rows, seed, step=1.0):
     rng = np.random.default_rng([seed, rows])
     time = START + step * np.arange(rows) + rng.uniform(0.0, 0.4 * step, rows)
     wild = rng.random((rows, 1)) < 0.05
-    velocity = np.cumsum(rng.normal(0.0, 0.05, (rows, 2)), axis=0) + [1.0, 0.5]
+    velocity = np.array([1.0, 0.5]) + np.cumsum(rng.normal(0.0, 0.05, (rows, 2)), axis=0)
     position = np.cumsum(velocity * step, axis=0) + rng.normal(0.0, 0.5, (rows, 2))
     position += wild * rng.uniform(20.0, 60.0, (rows, 2))
     return pa.table(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from surefix.errors import InputError, OptionsError
 from surefix.fleet.dataset import schema_of
+from surefix.fleet.options import TRACK
 
 __all__ = ["Found", "find_inputs"]
 
@@ -22,7 +23,7 @@ class Found(NamedTuple):
     files: tuple[str, ...] = ()
 
 
-def find_inputs(inputs: Sequence[str | Path], place: Path, track: str) -> Found:
+def find_inputs(inputs: Sequence[str | Path], place: Path, track: str | None) -> Found:
     """Look at the inputs.
 
     A Parquet file with the column of the track, or a folder of such (or whose paths name it, as
@@ -35,12 +36,12 @@ def find_inputs(inputs: Sequence[str | Path], place: Path, track: str) -> Found:
     place
         The folder of the outputs; what is below it is no input.
     track
-        Name of the column.
+        Name of the column, which must be there; None for the usual one, if it is.
 
     Raises
     ------
     OptionsError
-        There is nothing, or a data set among other inputs.
+        There is nothing, a data set among other inputs, or no column of that name.
     """
     logs: dict[Path, None] = {}
     for given in inputs:
@@ -48,7 +49,7 @@ def find_inputs(inputs: Sequence[str | Path], place: Path, track: str) -> Found:
         files = _below(path, place.absolute()) if path.is_dir() else [path]
         tables = [str(file) for file in files if file.suffix.lower() == ".parquet"]
         root = path if path.is_dir() else path.parent
-        if tables and _has_track(tables, str(root), track):
+        if tables and _has_track(tables, str(root), track or TRACK):
             if len(inputs) > 1:
                 raise OptionsError(
                     f"{given}, a data set of many tracks, beside other inputs",
@@ -57,6 +58,11 @@ def find_inputs(inputs: Sequence[str | Path], place: Path, track: str) -> Found:
                 )
             return Found((), root, tuple(tables))
         logs |= dict.fromkeys(file.resolve() for file in files)
+    if track is not None:
+        raise OptionsError(
+            f"no column {track} in {', '.join(str(each) for each in inputs)}",
+            "a Parquet data set with a column that names the track of each row",
+        )
     if not logs:
         told = ", ".join(str(each) for each in inputs) or "no input"
         raise OptionsError(f"{told}: no log there", "files " + ", ".join(sorted(_LOGS)))

@@ -35,7 +35,8 @@ def output_names(logs: Sequence[Path], known: Mapping[str, str]) -> dict[Path, s
     for folders in range(1, depth):
         proposed = {log: _joined(log, folders, log.stem) for log in waiting}
         waiting = _settle(proposed, out, taken)
-    waiting = _settle({log: _joined(log, 1, log.name) for log in waiting}, out, taken)
+    with_suffix = {log: log.name.replace(".", "-") for log in waiting}
+    waiting = _settle(with_suffix, out, taken)
     for log in waiting:
         number = 2
         while f"{log.stem}-{number}".casefold() in taken:

@@ -9,7 +9,10 @@ from surefix.errors import OptionsError
 from surefix.io.writers import SUFFIXES
 from surefix.pipelines.options import CleanOptions
 
-__all__ = ["FleetOptions"]
+__all__ = ["TRACK", "FleetOptions"]
+
+TRACK = "track_id"
+"""Column that names the track, unless the options say otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +31,8 @@ class FleetOptions:
     require_checksum
         False accepts NMEA sentences without a checksum.
     track
-        Column that says which track a row of a data set belongs to.
+        Column that says which track a row of a data set belongs to; default `TRACK`, where there is
+        one.
     suffix
         Of the outputs of logs; those of tracks are Parquet files.
     jobs
@@ -39,7 +43,7 @@ class FleetOptions:
     columns: Mapping[str, str] = field(default_factory=dict)
     beside: Mapping[str, str] = field(default_factory=dict)
     require_checksum: bool = True
-    track: str = "track_id"
+    track: str | None = None
     suffix: str = ".parquet"
     jobs: int = 1
 

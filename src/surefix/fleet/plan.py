@@ -16,7 +16,7 @@ from surefix.fleet.arrange import arrange, arranged
 from surefix.fleet.dataset import Unit, digest, index, schema_of, units
 from surefix.fleet.found import Found
 from surefix.fleet.names import output_names
-from surefix.fleet.options import FleetOptions
+from surefix.fleet.options import TRACK, FleetOptions
 from surefix.fleet.tracks import plan_tracks
 from surefix.fleet.work import LogTask, TrackTask
 
@@ -99,9 +99,9 @@ def plan_units(found: Found, folder: Path, options: FleetOptions) -> Planned:
     """
     if options.beside:
         raise OptionsError("logs beside a data set of many tracks", "logs of one track each")
-    root = str(found.root)
-    schema = schema_of(found.files, root, options.track)
-    plan = plan_tracks(schema, options.track, options.clean, options.columns, root)
+    root, track = str(found.root), options.track or TRACK
+    schema = schema_of(found.files, root, track)
+    plan = plan_tracks(schema, track, options.clean, options.columns, root)
     data = index(found.files, root, plan.track, plan.kind)
     prepare: Callable[[], None] = lambda: None  # noqa: E731
     if not data.laid_out:

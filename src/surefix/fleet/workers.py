@@ -68,16 +68,14 @@ def worked_off(
             for ready in connection.wait(list(busy)):
                 assert isinstance(ready, connection.Connection)
                 worker, task = busy.pop(ready)
+                result: Result | Exception
                 try:
                     result = ready.recv()
                 except (EOFError, OSError):
                     worker.process.join()
-                    code = worker.process.exitcode
-                    yield task, _death(code)
-                    worker = _hired(run)
-                else:
-                    yield task, result
+                    result, worker = _death(worker.process.exitcode), _hired(run)
                 idle.append(worker)
+                yield task, result
     finally:
         _dismiss([*idle, *(worker for worker, _ in busy.values())])
 
