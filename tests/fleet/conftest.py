@@ -25,7 +25,7 @@ def spark(tmp_path_factory):
             sql.SparkSession.builder.master("local[2]")
             .config("spark.ui.enabled", "false")
             .config("spark.driver.memory", "1g")
-            .config("spark.sql.shuffle.partitions", "2")
+            .config("spark.sql.shuffle.partitions", "1")  # each takes a Python process of its own
             .config("spark.sql.warehouse.dir", str(folder / "tables"))
             .config("spark.local.dir", str(folder / "local"))
             .config(

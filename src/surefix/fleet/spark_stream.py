@@ -209,8 +209,7 @@ class Tracks:
     def _go_on(self, track: Any, state: _State, watermark_ms: int) -> Iterator[pd.DataFrame]:
         passed = 1000 * watermark_ms if watermark_ms > 0 else _NEVER
         ended = passed > _NEVER and state.latest + self._idle <= passed
-        enough = state.stored or state.waiting >= self._plan.options.settle_rows
-        if state.waiting and (enough or ended):
+        if state.waiting and (ended or self._enough(state)):
             ready, waiting = self._parted(passed)
             if state.stored or ended or ready.num_rows >= self._plan.options.settle_rows:
                 if waiting.num_rows:
@@ -227,9 +226,14 @@ class Tracks:
             return
         self._remember(state)
 
+    def _enough(self, state: _State) -> bool:
+        """Whether the rows of a track can be looked at, or are too few to settle on."""
+        return bool(state.stored) or state.waiting >= self._plan.options.settle_rows
+
     def _remember(self, state: _State) -> None:
         """Store the state, and be called again when the rows that wait may go on."""
-        due = state.latest if state.stored and state.waiting else state.latest + self._idle
+        soon = state.waiting and self._enough(state)
+        due = state.latest if soon else state.latest + self._idle
         timer = max(-(-due // 1000), -1)
         if timer != state.timer:
             if state.timer >= 0:
