@@ -28,7 +28,8 @@ import surefix
 from surefix.fleet.options import FleetOptions
 from surefix.fleet.run import clean_fleet
 from surefix.io.table import from_frame
-from surefix.pipelines.stream import begin_stream, push, snapshot
+from surefix.pipelines.session import advance, begin_session
+from surefix.pipelines.snapshot import snapshot
 
 TRACKS, ROWS = 12, 500  # that are cleaned
 MANY = 4_000  # tracks that are only moved
@@ -170,9 +171,9 @@ def snapshots() -> dict[str, int]:
     table = tracks(1).drop_columns(["track_id"])
     out = {}
     for method in ("multi-hypothesis", "igg3"):
-        stream = begin_stream(surefix.CleanOptions(mode="realtime", method=method, settle_rows=200))
-        list(push(stream, from_frame(table)))
-        out[f"{method}_bytes"] = len(snapshot(stream))
+        options = surefix.CleanOptions(mode="realtime", method=method, settle_rows=200)
+        session, _ = advance(begin_session([("track", "fixes")], options), 0, from_frame(table))
+        out[f"{method}_bytes"] = len(snapshot(session))
     return out
 
 

@@ -26,6 +26,7 @@ def clean(
     velocity: Data | None = None,
     heading: Data | None = None,
     columns: Mapping[str, str] | None = None,
+    target: str | None = None,
     options: CleanOptions | None = None,
 ) -> Cleaned:
     """Clean a log and give the track, and for every fix a verdict with its reason.
@@ -41,6 +42,9 @@ def clean(
         Other sensors, each of the same kinds, with their own clocks and rates.
     columns
         What columns mean where their names do not say it: ``{"time": "lcm_timestamp:us"}``.
+    target
+        Whose fixes to take from the log of an acoustic positioning system: a transponder, or
+        ``ship``; default the transponder that is seen most often.
     options
         Mode, method and figures; see `CleanOptions`.
 
@@ -62,6 +66,7 @@ def clean(
         velocity=velocity,
         heading=heading,
         columns=columns,
+        target=target,
     )
     return clean_sources(sources, options or CleanOptions())
 

@@ -22,10 +22,12 @@ from surefix.cli_inputs import (
     Depth,
     Heading,
     NoChecksum,
+    Target,
     Velocity,
     chosen_options,
     keep_inputs,
 )
+from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.errors import OptionsError, SurefixError
@@ -72,7 +74,7 @@ def clean(
         typer.Option(
             "-o",
             "--output",
-            help="Where to write the track: .csv, .parquet, .geojson or .gpx; repeatable.",
+            help="Where to write the track: .csv, .parquet, .geojson, .gpx or .nmea; repeatable.",
         ),
     ] = None,
     mode: Annotated[
@@ -155,6 +157,7 @@ def clean(
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
     iso: Annotated[bool, typer.Option("--iso", help="Write times as ISO 8601 in UTC.")] = False,
     no_checksum: NoChecksum = False,
+    target: Target = None,
     as_json: AsJson = False,
 ) -> None:
     """Clean a log: one row per fix, each with its verdict, beside the clean track."""
@@ -194,6 +197,7 @@ def clean(
             heading=heading,
             columns={**columns, **mapping(column or [])},
             require_checksum=not no_checksum,
+            target=target,
             progress=told,
         )
         done = deliver(clean_batches(sources, chosen), output or [], iso=iso)
@@ -215,6 +219,7 @@ def info(
     heading: Heading = None,
     column: Columns = None,
     no_checksum: NoChecksum = False,
+    target: Target = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what is in a log: sensors, rates, gaps, faults, and the command that cleans it."""
@@ -230,6 +235,7 @@ def info(
             heading=heading,
             columns=mapping(column or []),
             require_checksum=not no_checksum,
+            target=target,
             progress=told,
         )
     _print(found, info_lines(found), as_json)
@@ -282,6 +288,7 @@ def reproduce(
 app.command()(compare)
 app.command()(locate)
 app.command()(fleet)
+app.command()(live)
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from surefix.cli_inputs import Columns, NoChecksum, chosen_options
+from surefix.cli_inputs import Columns, NoChecksum, Target, chosen_options
 from surefix.cli_progress import over_units
 from surefix.errors import OptionsError
 
@@ -60,12 +60,13 @@ def fleet(
         str | None, typer.Option(metavar="FILE", help="The same for a heading log.")
     ] = None,
     to: Annotated[
-        Literal["parquet", "csv", "geojson", "gpx"],
+        Literal["parquet", "csv", "geojson", "gpx", "nmea"],
         typer.Option("--format", help="Of the outputs; tracks of a data set are Parquet."),
     ] = "parquet",
     jobs: Annotated[
         int | None, typer.Option(help="Processes that share the work; default one a processor.")
     ] = None,
+    target: Target = None,
     no_checksum: NoChecksum = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -85,6 +86,7 @@ def fleet(
         columns={**columns, **mapping(column or [])},
         beside={role: name for role, name in beside.items() if name is not None},
         require_checksum=not no_checksum,
+        target=target,
         track=track,
         suffix=f".{to}",
         jobs=(os.cpu_count() or 1) if jobs is None else jobs,

@@ -17,6 +17,7 @@ __all__ = [
     "Depth",
     "Heading",
     "NoChecksum",
+    "Target",
     "Velocity",
     "chosen_options",
     "keep_inputs",
@@ -39,6 +40,13 @@ Heading = Annotated[
 ]
 NoChecksum = Annotated[
     bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
+]
+Target = Annotated[
+    str | None,
+    typer.Option(
+        help="Whose fixes to take from an acoustic log: a transponder, or ship; "
+        "default the transponder seen most often."
+    ),
 ]
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
+import numpy as np
+
 from surefix.types import Reason, Verdict, Verdicts
 
 __all__ = ["CALENDAR_FROM", "clock", "texts", "vector"]
@@ -13,7 +15,7 @@ __all__ = ["CALENDAR_FROM", "clock", "texts", "vector"]
 CALENDAR_FROM = 1e8
 """s: smaller times count from the start of a log and carry no date."""
 
-_FIXED = {
+_FIXED: dict[int, str] = {
     Reason.AGREES: "agrees",
     Reason.NO_POSITION: "no position",
     Reason.NO_VALUE: "no value",
@@ -82,20 +84,26 @@ def _text(
         case Reason.LATE:
             return f"arrived after the fix of {clock(detail)} was already out"
         case _:
-            return _FIXED[Reason(reason)]
+            return _FIXED[reason]
 
 
 def texts(verdicts: Verdicts) -> list[str]:
     """One sentence per observation."""
-    return [
-        _text(*row)
-        for row in zip(
-            verdicts.reason.tolist(),
-            verdicts.verdict.tolist(),
-            verdicts.weight.tolist(),
-            verdicts.innovation_sigma.tolist(),
-            verdicts.detail.tolist(),
-            verdicts.offset.tolist(),
-            strict=True,
-        )
-    ]
+    found = np.empty(len(verdicts.reason), dtype=object)
+    for reason in np.unique(verdicts.reason).tolist():
+        rows = np.flatnonzero(verdicts.reason == reason)
+        if reason in _FIXED:
+            found[rows] = _FIXED[reason]
+            continue
+        found[rows] = [
+            _text(reason, *row)
+            for row in zip(
+                verdicts.verdict[rows].tolist(),
+                verdicts.weight[rows].tolist(),
+                verdicts.innovation_sigma[rows].tolist(),
+                verdicts.detail[rows].tolist(),
+                verdicts.offset[rows].tolist(),
+                strict=True,
+            )
+        ]
+    return found.tolist()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 __all__ = [
     "AXES",
     "BoolArray",
+    "ByteArray",
     "Channel",
     "Cleaned",
     "CleanedChannel",
@@ -38,6 +39,7 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+ByteArray = NDArray[np.uint8]
 
 AXES = ("x", "y", "z")
 

@@ -12,13 +12,14 @@ import pytest
 import surefix
 from docs.pages import PAGES, ROOT
 from surefix.geo.local_frame import LocalFrame
+from surefix.io.acoustic_sentence import PROPRIETARY
 from surefix.io.nmea_record import ProblemKind
 from surefix.io.nmea_sentence import LAYOUTS
 from surefix.io.options_file import read_options
 from surefix.io.roles import ALIASES, ROLES, UNITS
+from surefix.io.write_nmea import TYPES
 from surefix.pipelines import deliver
-from surefix.pipelines.channels import CHANNEL_HEAD
-from surefix.pipelines.clean import HEAD
+from surefix.pipelines.channels import channel_head
 from surefix.pipelines.options import METHODS, MULTI_HYPOTHESIS
 from surefix.reasons import texts
 from surefix.robust.loss import LOSSES
@@ -80,6 +81,16 @@ def test_columns_are_those_that_are_recognised():
 def test_sentences_are_those_that_are_read():
     listed = words(row[0] for row in table("reference/files.md", "Input: NMEA 0183"))
     assert sorted(listed) == sorted(LAYOUTS)
+
+
+def test_acoustic_messages_are_those_that_are_read():
+    listed = words(row[0] for row in table("reference/files.md", "Input: acoustic positioning"))
+    assert sorted(listed) == sorted([*PROPRIETARY, "USBLLONG", "DVL"])
+
+
+def test_nmea_output_is_what_is_written():
+    listed = words(row[0] for row in table("reference/files.md", "Output: NMEA 0183"))
+    assert listed == [name for name in TYPES if name != "HDT"]
 
 
 def test_output_columns_are_those_that_are_written():
@@ -194,8 +205,8 @@ def test_modules_that_are_named_exist():
 
 def test_figures_in_the_how_to_are_those_of_the_code():
     text = (DOCS / "how-to.md").read_text(encoding="utf-8")
-    assert f"first {HEAD:,}\nrows" in text
-    assert f"({CHANNEL_HEAD:,} values" in text
+    assert f"first {surefix.CleanOptions().settle_rows:,}\nrows" in text
+    assert f"({channel_head(surefix.CleanOptions()):,} values" in text
     assert f"more than {deliver._KEPT:,}" in text
 
 

@@ -11,20 +11,16 @@ import pytest
 from acceptance.product import START, geographic, survey, write
 from surefix.api import to_table
 from surefix.io.table import from_frame
-from surefix.pipelines import clean as pipeline
 from surefix.pipelines import inputs
-from surefix.pipelines.clean import clean_batches, clean_sources
+from surefix.pipelines.clean import Source, clean_batches, clean_sources
 from surefix.pipelines.joining import join
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.rows import Source
 from surefix.types import Cleaned, Log
 
 HEAD = 120
 
 
-@pytest.fixture(autouse=True)
-def short_head(monkeypatch):
-    monkeypatch.setattr(pipeline, "HEAD", HEAD)
+REALTIME = CleanOptions(mode="realtime", settle_rows=HEAD)
 
 
 def faulty(n: int = 900) -> pd.DataFrame:
@@ -74,7 +70,7 @@ def realtime(sizes: list[int], depth: list[int] | None = None, **options) -> lis
         pressure = pd.DataFrame({"time": log["time"] + 0.21, "depth": -log["z"] + 0.1})
         chunks = cut(pressure, depth, role="depth", sensor="pressure")
         sources.append(Source(iter(chunks), "depth", "pressure"))
-    return list(clean_batches(sources, CleanOptions(mode="realtime", **options)))
+    return list(clean_batches(sources, replace(REALTIME, **options)))
 
 
 def equal(one: Cleaned, other: Cleaned, within: float = 0.0) -> None:
@@ -135,8 +131,7 @@ def test_modes_that_see_the_future_do_not_see_the_chunks(mode):
 
 def test_the_past_does_not_know_the_future():
     """In real time a row is the same whether the log goes on or ends there."""
-    frame = faulty()
-    options = CleanOptions(mode="realtime")
+    frame, options = faulty(), REALTIME
     sizes = [HEAD + 30, *[10] * 70]
     whole = join(list(clean_batches([Source(iter(cut(frame, sizes)), "fixes")], options)))
     early = frame[:550]
@@ -151,7 +146,7 @@ def test_block_size_of_the_reader(tmp_path, monkeypatch, mode):
     """A file is the same log in blocks of any size, and the same as its table."""
     frame = faulty()
     path = write(tmp_path / "log.csv", frame)
-    options = CleanOptions(mode=mode)
+    options = CleanOptions(mode=mode, settle_rows=HEAD)
     results = [clean_sources(inputs.open_inputs([pd.read_csv(path)]), options)]
     read = inputs.read_table
     for block in (1 << 22, 20_000):

@@ -7,7 +7,7 @@ import pytest
 import surefix
 from acceptance.product import clean, local, off_the_line, read, told_in_one_line
 from acceptance.product import surefix as run
-from pipelines.test_batches import HEAD, equal, realtime, short_head  # noqa: F401  # a fixture
+from pipelines.test_batches import HEAD, equal, realtime
 from surefix import CleanOptions, Reason, Verdict
 from surefix.errors import OptionsError
 from surefix.filters.deciding import THRESHOLDS

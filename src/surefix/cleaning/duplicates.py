@@ -193,18 +193,14 @@ def _is_polled(steps: FloatArray) -> bool:
     axes at once. Within stretches where the sensor moves, the number of joint repetitions is
     compared with what independent axes would give, in standard deviations.
     """
-    same = steps[:, :2] == 0.0
-    joint, expected, variance = 0.0, 0.0, 0.0
-    for begin in range(0, len(same) - _STRETCH + 1, _STRETCH):
-        part = same[begin : begin + _STRETCH]
-        both = part.all(axis=1)
-        if (~both).sum() < _MOVING:
-            continue
-        chance = part.mean(axis=0).prod()
-        joint += both.sum()
-        expected += _STRETCH * chance
-        variance += _STRETCH * (part.mean(axis=0) * (1.0 - part.mean(axis=0))).prod()
-    return bool(joint - expected > _TOGETHER * variance**0.5)
+    count = len(steps) // _STRETCH
+    same = (steps[: count * _STRETCH, :2] == 0.0).reshape(count, _STRETCH, 2)
+    both = same.all(axis=2).sum(axis=1)
+    moving = _STRETCH - both >= _MOVING
+    share = same[moving].mean(axis=1)
+    more = both[moving].sum() - _STRETCH * share.prod(axis=1).sum()
+    variance = _STRETCH * (share * (1.0 - share)).prod(axis=1).sum()
+    return bool(more > _TOGETHER * variance**0.5)
 
 
 def _in_grains(steps: FloatArray, grain: FloatArray) -> FloatArray:

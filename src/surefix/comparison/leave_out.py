@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from surefix.pipelines.rows import Source
+from surefix.pipelines.clean import Source
 from surefix.types import BoolArray, Cleaned, Fixes, FloatArray, IntArray, Log, Reason
 
 __all__ = [

@@ -10,8 +10,8 @@ from surefix.comparison.filters import imm, sage_husa, wolf
 from surefix.comparison.gnc import gnc
 from surefix.errors import OptionsError
 from surefix.filters.deciding import AHEAD
-from surefix.pipelines.clean import Estimator
 from surefix.pipelines.options import METHODS, Mode
+from surefix.pipelines.state import Estimator
 
 __all__ = ["BASELINES", "COMPARED", "Baseline", "cleaner_of", "works_in"]
 

@@ -21,6 +21,7 @@ __all__ = [
     "POOR",
     "POOR_WEIGHT",
     "RESTART",
+    "RESTARTS",
     "VELOCITY_OUT",
     "VELOCITY_POOR",
     "Bank",
@@ -47,7 +48,9 @@ POOR: Final = 256
 VELOCITY_POOR: Final = 512
 DENY: Final = 1024
 RESTART: Final = 2048
-"""Bits 11 … 13: the axes whose track begins anew with this fix."""
+"""Shifted by the axis: its track begins anew with this fix."""
+RESTARTS: Final = 7 * RESTART
+"""Any axis."""
 MANOEUVRE: Final = 16384
 """The highest rate changed at once, after the last observation before this one that was used."""
 
@@ -82,8 +85,8 @@ class Prior(NamedTuple):
     sigma_velocity
         Standard deviation of a velocity nothing is known about, m/s.
     adapt
-        (`MOST_SENSORS`, 2) how fast the noise of the positions and velocities of each sensor
-        follows what is observed: 1 over the number of observations remembered, 0 for not at all.
+        (`MOST_SENSORS`,) how fast the noise of the positions of each sensor follows what is
+        observed: 1 over the number of observations remembered, 0 for not at all.
     """
 
     isolated: float
@@ -97,7 +100,7 @@ class Prior(NamedTuple):
     again: float
     spread: FloatArray
     sigma_velocity: float
-    adapt: FloatArray = np.zeros((MOST_SENSORS, 2))
+    adapt: FloatArray = np.zeros(MOST_SENSORS)
 
 
 class Bank(NamedTuple):
@@ -131,13 +134,14 @@ class Bank(NamedTuple):
     slip
         (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
     lost, missed
-        (k, axes) s, the first fix left out since the last one used, NaN if none; and how many.
+        (k, axes) how many fixes were left out since the last one used, and the first of them, s,
+        which means nothing while there are none.
     touched
         (k, axes) s, when an observation of the axis was last used.
     moved
         (k,) s, when a velocity was last used.
     scale
-        (`MOST_SENSORS`, 2) factor of the variances of positions and velocities, as adapted.
+        (`MOST_SENSORS`,) factor of the variances of positions, as adapted.
     announced
         (1,) s, the beginning of the track as it was last told.
     """
@@ -190,7 +194,7 @@ class Found(NamedTuple):
     offset
         (n, axes) offset of the run that the epoch's fix belongs to; NaN if to none.
     scale
-        (n, 2) factor of the variance of the epoch's position and velocity, as adapted.
+        (n,) factor of the variance of the epoch's position, as adapted.
     """
 
     mean: FloatArray
@@ -224,6 +228,6 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d), np.int64),
         np.full((most, d), np.nan),
         np.full(most, np.nan),
-        np.ones((MOST_SENSORS, 2)),
+        np.ones(MOST_SENSORS),
         np.full(1, np.nan),
     )

@@ -16,6 +16,7 @@ from surefix.filters.hypotheses import (
     POOR,
     POOR_WEIGHT,
     RESTART,
+    RESTARTS,
     Bank,
     Found,
 )
@@ -30,7 +31,7 @@ from surefix.filters.hypothesis_axis import (
     reach,
     update_axis,
 )
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_branches import log_sum, wrapped
 from surefix.filters.records import Motion
 from surefix.jit import helper
 from surefix.types import BoolArray, FloatArray, IntArray
@@ -38,7 +39,6 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["apply_position", "best_of", "copy_hypothesis", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
-_ANEW = 7 * RESTART
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
 
@@ -134,7 +134,7 @@ def apply_position(
         bank.length[k] = 1
     elif code & CONTINUE:
         bank.length[k] += 1
-    elif code & (DROP | _ANEW):
+    elif code & (DROP | RESTARTS):
         bank.run[k] = -1
     elif code & COMMIT:
         bank.run[k] = -1
@@ -145,7 +145,7 @@ def apply_position(
     for a in range(motion.axes):
         m = bank.mean[k, a]
         P = bank.covariance[k, a]
-        if code & (DROP | _ANEW):
+        if code & (DROP | RESTARTS):
             forget(m, P, n)
         elif code & COMMIT:
             commit(m, P, n)
@@ -230,12 +230,7 @@ def merge(motion: Motion, bank: Bank, count: int, keep: BoolArray) -> None:
                     break
             if alike:
                 keep[j] = False
-                if bank.weight[i] >= bank.weight[j]:
-                    bank.weight[i] += math.log1p(math.exp(bank.weight[j] - bank.weight[i]))
-                else:
-                    bank.weight[i] = bank.weight[j] + math.log1p(
-                        math.exp(bank.weight[i] - bank.weight[j])
-                    )
+                bank.weight[i] = log_sum(bank.weight[i], bank.weight[j])
 
 
 @helper

@@ -30,6 +30,7 @@ __all__ = [
     "BRANCHES",
     "CONFIRMED",
     "log_normal",
+    "log_sum",
     "log_wild",
     "position_branches",
     "velocity_branches",
@@ -97,7 +98,14 @@ def _anywhere(square: float) -> float:
 
 
 @helper
-def _log_sum(a: float, b: float) -> float:
+def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
+    """Scale, squared, of component c of axis a if the highest rate changed ``gap`` seconds ago."""
+    change = agility(motion.density[a], gap) * reach(motion.order, c, gap)
+    return change * change + S
+
+
+@helper
+def log_sum(a: float, b: float) -> float:
     """Logarithm of the sum of two exponentials."""
     return max(a, b) + math.log1p(math.exp(-abs(a - b)))
 
@@ -143,8 +151,7 @@ def velocity_branches(
             distance += nu * nu / S
             gap = _since(bank.touched[k, a], time)
             longest = max(longest, gap)
-            free = agility(motion.density[a], gap) * reach(motion.order, 1, gap)
-            free = free * free + S
+            free = _freed(motion, a, 1, gap, S)
             swift += nu * nu / free
             quick += 0.5 * math.log(free)
             change = nu - bank.slip[k, a]
@@ -154,10 +161,10 @@ def velocity_branches(
         out = prior.velocity
         if (bank.faulty[k] >> sensor) & 1:
             out = prior.again
-            outside = _log_sum(outside + math.log(1.0 - _ALIKE), alike + math.log(_ALIKE))
+            outside = log_sum(outside + math.log(1.0 - _ALIKE), alike + math.log(_ALIKE))
         if forced[d] != 0.0:
             usual, noisy = inside + math.log(1.0 - prior.poor), poor + math.log(prior.poor)
-            score[total] = bank.weight[k] + _log_sum(usual, noisy) + math.log1p(-out)
+            score[total] = bank.weight[k] + log_sum(usual, noisy) + math.log1p(-out)
             fair = noisy > usual and math.isnan(forced[d])
             parent[total], code[total] = k, VELOCITY_POOR if fair else 0
             total += 1
@@ -234,8 +241,7 @@ def position_branches(
                 distance += nu * nu / S
                 gap = _since(bank.touched[k, a], time)
                 longest = max(longest, gap)
-                free = agility(motion.density[a], gap) * reach(motion.order, 0, gap)
-                free = free * free + S
+                free = _freed(motion, a, 0, gap, S)
                 swift += nu * nu / free
                 quick += 0.5 * math.log(free)
                 wide[a] = s2 + S
@@ -267,7 +273,7 @@ def position_branches(
             code[total] = DROP
         else:
             score[total] = base + math.log(staying)
-            score[total] += belongs if unknown else _log_sum(usual, noisy)
+            score[total] += belongs if unknown else log_sum(usual, noisy)
             code[total] = POOR if noisy > usual and not unknown else 0
             if bank.run[k] >= 0 and not unknown and belongs - offset > _PREFERS:
                 code[total] |= DENY

@@ -16,7 +16,11 @@ from surefix.types import FloatArray
 __all__ = ["adapt", "innovate"]
 
 _LARGEST = 9.0  # no squared innovation counts for more when noise is adapted …
-_MEAN_SQUARE = 0.9889  # … and then they have this mean, if all is well
+_MEAN_SQUARE = (
+    math.erf(math.sqrt(0.5 * _LARGEST))
+    - math.sqrt(2.0 * _LARGEST / math.pi) * math.exp(-0.5 * _LARGEST)
+    + _LARGEST * math.erfc(math.sqrt(0.5 * _LARGEST))
+)  # … and then they have this mean, if all is well
 _QUIET, _LOUD = 0.01, 100.0  # factors of a variance within which it is adapted
 
 
@@ -32,7 +36,7 @@ def innovate(
 ) -> None:
     """Standardised innovations of the likeliest hypothesis; nought where nothing is observed.
 
-    ``share`` becomes what part of each variance is that of the observation.
+    ``share`` becomes what part of the variance of each axis is that of the position observed.
     """
     d = motion.axes
     best = best_of(bank.weight, bank.number[0])
@@ -47,7 +51,6 @@ def innovate(
         nu = z[d + a] - bank.mean[best, a, 1]
         S = bank.covariance[best, a, 1, 1] + r[d + a]
         out.standardised[k, d + a] = nu / math.sqrt(S)
-        share[d + a] = r[d + a] / S
 
 
 @helper
@@ -60,20 +63,17 @@ def adapt(
     share: FloatArray,
     out: Found,
 ) -> None:
-    """Let the noise figures follow the innovations that were used.
+    """Let the noise of the positions follow the innovations that were used.
 
     Squares that are larger than supposed call for more noise of the sensor, in proportion to its
     share of the variance.
     """
-    d = motion.axes
-    for part in range(2):
-        gain, total, whole = prior.adapt[sensor, part], 0.0, 0.0
-        for a in range(d):
-            c = part * d + a
-            s = out.standardised[k, c]
-            if not out.weight[k, c] > 0.5 or math.isnan(s):
-                continue
-            total += share[c] * (min(s * s, _LARGEST) - _MEAN_SQUARE)
-            whole += share[c]
-        step = math.exp(gain * total / max(whole, 1e-9))
-        bank.scale[sensor, part] = min(max(bank.scale[sensor, part] * step, _QUIET), _LOUD)
+    total, whole = 0.0, 0.0
+    for a in range(motion.axes):
+        s = out.standardised[k, a]
+        if not out.weight[k, a] > 0.5 or math.isnan(s):
+            continue
+        total += share[a] * (min(s * s, _LARGEST) - _MEAN_SQUARE)
+        whole += share[a]
+    step = math.exp(prior.adapt[sensor] * total / max(whole, 1e-9))
+    bank.scale[sensor] = min(max(bank.scale[sensor] * step, _QUIET), _LOUD)

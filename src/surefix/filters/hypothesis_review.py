@@ -18,7 +18,7 @@ from surefix.filters.rts import Smoothed
 from surefix.jit import helper, kernel
 from surefix.types import BoolArray, FloatArray
 
-__all__ = ["deleted_residuals", "review"]
+__all__ = ["deleted", "deleted_residuals", "review"]
 
 
 def deleted_residuals(
@@ -48,12 +48,25 @@ def deleted_residuals(
     e = epochs.z - smoothed.mean[:, :m]
     if motion.period > 0.0:
         e[:, 0] -= motion.period * np.rint(e[:, 0] / motion.period)
-    R = epochs.variance
-    own = R / np.where(fixed > 0.0, fixed, 1.0)
-    gain = np.where(fixed > 0.0, own / np.maximum(own - P, 1e-9 * own), 1.0)
-    residual: FloatArray = e * gain
-    spread: FloatArray = np.where(np.isnan(epochs.z), np.nan, R + P * gain)
-    return residual, spread
+    residual, variance = deleted(e, P, epochs.variance, fixed)
+    return residual, np.where(np.isnan(epochs.z), np.nan, variance)
+
+
+def deleted(
+    e: FloatArray, P: FloatArray, R: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals and their variances as if each observation had not been used.
+
+    Parameters
+    ----------
+    e, P
+        Residuals ``z − Hx`` and variances ``HPHᵀ`` of the smoothed estimate.
+    R, weight
+        Variance of the observation, and with what weight it was used; 0: it was not.
+    """
+    own = R / np.where(weight > 0.0, weight, 1.0)
+    gain = np.where(weight > 0.0, own / np.maximum(own - P, 1e-9 * own), 1.0)
+    return e * gain, R + P * gain
 
 
 def review(

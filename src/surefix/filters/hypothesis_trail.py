@@ -14,6 +14,7 @@ from surefix.filters.hypotheses import (
     POOR,
     POOR_WEIGHT,
     RESTART,
+    RESTARTS,
     VELOCITY_OUT,
     VELOCITY_POOR,
     Trail,
@@ -187,7 +188,7 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
     for k in range(head, n):
         best = trail.best[k]
         code = trail.code[k, best]
-        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | MANOEUVRE | 7 * RESTART)):
+        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | MANOEUVRE | RESTARTS)):
             return k
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)

@@ -174,22 +174,23 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
     poor = (fixed[:, :axes] == POOR_WEIGHT).any(axis=1) & seen.any(axis=1)
     some = out.any(axis=1) & ~whole
     turns = (said.jump >> axes > 0).sum()
-    counts = {
-        "isolated": whole.sum(),
-        "partial": some.sum(),
-        "poor": poor.sum(),
-        "manoeuvre": turns,
-    }
     total = seen.any(axis=1).sum()
-    shares = {
-        name: float((counts[name] + wrong) / (total + everything))
-        for name, (wrong, everything) in _SHARES.items()
-    }
+
+    def share(name: str, count: int) -> float:
+        wrong, everything = _SHARES[name]
+        return float((count + wrong) / (total + everything))
+
     spread = prior.spread.copy()
     if out.sum() >= _FEW:
         size = float(np.median(np.abs(residual[:, :axes][out])))
         spread[:axes] = max(size, _LEAST_WILD * sigma)
-    return Prior._make((prior._asdict() | shares | {"spread": spread}).values())
+    return prior._replace(
+        isolated=share("isolated", whole.sum()),
+        partial=share("partial", some.sum()),
+        poor=share("poor", poor.sum()),
+        manoeuvre=share("manoeuvre", turns),
+        spread=spread,
+    )
 
 
 def _likeliest(

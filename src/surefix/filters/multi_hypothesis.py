@@ -196,7 +196,7 @@ def _run(
     origin, before = np.empty(most, np.int64), np.empty(most, np.int64)
     said, spoken = np.empty(most, np.int64), np.empty(most, np.int64)
     keep = np.empty(most, np.bool_)
-    r, share = np.empty(2 * d), np.zeros(2 * d)
+    r, share = np.empty(2 * d), np.zeros(d)
     adapting = np.any(prior.adapt > 0.0)
     swaps = 0
     speed = prior.sigma_velocity
@@ -210,9 +210,10 @@ def _run(
         time = epochs.time[k]
         sensor = epochs.sensor[k] if len(epochs.sensor) else 0
         z, forced = epochs.z[k], epochs.fixed[k]
-        for c in range(2 * d):
-            found.scale[k, c // d] = one.scale[sensor, c // d]
-            r[c] = epochs.variance[k, c] * one.scale[sensor, c // d]
+        found.scale[k] = one.scale[sensor]
+        for a in range(d):
+            r[a] = epochs.variance[k, a] * one.scale[sensor]
+            r[d + a] = epochs.variance[k, d + a]
         if epochs.jump[k]:
             _displace(motion, one, epochs.jump[k])
         for i in range(one.number[0]):
@@ -320,5 +321,5 @@ def _blank(motion: Motion, n: int) -> Found:
         np.zeros(n, np.int64),
         np.full(n, np.nan),
         np.full((n, motion.axes), np.nan),
-        np.ones((n, 2)),
+        np.ones(n),
     )

@@ -59,7 +59,7 @@ def realtime_hypotheses(
         since,
         found.run,
         found.offset,
-        found.scale[:, 0],
+        found.scale,
     )
 
 

@@ -43,25 +43,13 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
     Estimate
         ``distance`` and ``standardised`` are deleted residuals; ``since`` marks the jumps.
     """
-    _, first, _ = filter_track(motion, loss, recovery, epochs, start(motion, recovery))
     if not len(epochs.time) or loss.code == 0:
+        _, first, _ = filter_track(motion, loss, recovery, epochs, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, first)
         return _judged(motion, loss, epochs, first, smoothed)
-    fixed, jump = _dated_back(epochs, first)
-    mirrored = backward(motion, epochs)
-    _, last, _ = filter_track(motion, loss, recovery, mirrored, start(motion, recovery))
-    against, back = _dated_back(mirrored, last)
-    jump |= _only_backward(motion, epochs, jump, back[::-1], recovery.after)
-    doubted = np.fmin(fixed, against[::-1])
-    doubted[doubted < _DOUBT] = 0.0
-    for g in range(motion.groups):
-        _drop_short(g, doubted, jump, np.isfinite(epochs.fixed))
-    decided = epochs._replace(fixed=doubted, jump=jump)
+    decided = _doubted(motion, loss, recovery, epochs)
     for _ in range(_SWEEPS):
-        _, filtered, _ = filter_track(motion, loss, recovery, decided, start(motion, recovery))
-        smoothed = smooth(motion, recovery, epochs.time, filtered)
-        found = _judged(motion, loss, epochs, filtered, smoothed)
-        jump = needed_jumps(motion, epochs, decided.jump, smoothed)
+        found, jump = _swept(motion, loss, recovery, epochs, decided)
         if not np.array_equal(jump, decided.jump):
             decided = decided._replace(jump=jump)
             continue
@@ -71,6 +59,36 @@ def offline(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> E
             break
         decided = decided._replace(fixed=fixed)
     return found
+
+
+def _doubted(motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs) -> Epochs:
+    """Leave out what either direction doubts."""
+    fixed, jump = _decided(motion, loss, recovery, epochs)
+    against, back = _decided(motion, loss, recovery, backward(motion, epochs))
+    jump |= _only_backward(motion, epochs, jump, back[::-1], recovery.after)
+    doubted = np.fmin(fixed, against[::-1])
+    doubted[doubted < _DOUBT] = 0.0
+    for g in range(motion.groups):
+        _drop_short(g, doubted, jump, np.isfinite(epochs.fixed))
+    return epochs._replace(fixed=doubted, jump=jump)
+
+
+def _decided(
+    motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs
+) -> tuple[FloatArray, IntArray]:
+    """Weights and jumps that one direction decides on; its states are not kept."""
+    _, found, _ = filter_track(motion, loss, recovery, epochs, start(motion, recovery))
+    return _dated_back(epochs, found)
+
+
+def _swept(
+    motion: Motion, loss: Loss, recovery: Recovery, epochs: Epochs, decided: Epochs
+) -> tuple[Estimate, IntArray]:
+    """Filter and smooth as decided: the estimate, and the jumps that are still needed."""
+    _, filtered, _ = filter_track(motion, loss, recovery, decided, start(motion, recovery))
+    smoothed = smooth(motion, recovery, epochs.time, filtered)
+    found = _judged(motion, loss, epochs, filtered, smoothed)
+    return found, needed_jumps(motion, epochs, decided.jump, smoothed)
 
 
 def backward(motion: Motion, epochs: Epochs) -> Epochs:

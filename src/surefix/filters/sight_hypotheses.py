@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypothesis_bank import best_of, keep_best
-from surefix.filters.hypothesis_branches import log_normal, log_wild
+from surefix.filters.hypothesis_branches import log_normal, log_sum, log_wild
 from surefix.filters.sight_fit import finish, fit, innovation, prepare
 from surefix.filters.sight_records import (
     MATURE_SIGHTS,
@@ -114,7 +114,7 @@ def _branches(
             out = prior.again[c]
             alike = log_normal(nu - bank.slip[i, c], S + r[c]) + math.log(_ALIKE)
             outside += math.log(1.0 - _ALIKE)
-            outside = max(alike, outside) + math.log1p(math.exp(-abs(alike - outside)))
+            outside = log_sum(alike, outside)
         if math.isnan(fixed) or fixed > 0.0:
             used = bank.used[i] | bit
             poor = bank.poor[i]
@@ -131,7 +131,7 @@ def _branches(
                 shape = np.empty_like(normal[i])
                 worse = fit(model, bank, i, z, r, anchor, used, poor | bit, other, shape)
                 usual, noisy = said + math.log1p(-prior.poor), worse + math.log(prior.poor)
-                inside = max(usual, noisy) + math.log1p(math.exp(-abs(usual - noisy)))
+                inside = log_sum(usual, noisy)
                 if noisy > usual:
                     step[i] = other
                     normal[i] = shape
@@ -209,11 +209,7 @@ def _thin(model: SightModel, bank: SightBank, origin: IntArray, again: BoolArray
         for j in range(left):
             if keep and _alike(bank, j, i):
                 keep = False
-                more, less = (
-                    max(bank.weight[j], bank.weight[i]),
-                    min(bank.weight[j], bank.weight[i]),
-                )
-                bank.weight[j] = more + math.log1p(math.exp(less - more))
+                bank.weight[j] = log_sum(bank.weight[j], bank.weight[i])
         if keep:
             if left != i:
                 _copy(bank, left, bank, i)

@@ -30,6 +30,8 @@ class FleetOptions:
         folder of each log and support it.
     require_checksum
         False accepts NMEA sentences without a checksum.
+    target
+        Whose fixes to take from acoustic logs; None for the transponder seen most often.
     track
         Column that says which track a row of a data set belongs to; default `TRACK`, where there is
         one.
@@ -43,6 +45,7 @@ class FleetOptions:
     columns: Mapping[str, str] = field(default_factory=dict)
     beside: Mapping[str, str] = field(default_factory=dict)
     require_checksum: bool = True
+    target: str | None = None
     track: str | None = None
     suffix: str = ".parquet"
     jobs: int = 1

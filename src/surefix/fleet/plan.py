@@ -65,7 +65,8 @@ def plan_logs(found: Found, folder: Path, options: FleetOptions, known: dict[str
     OptionsError
         An output would take the place of a log.
     """
-    how = _how(options, options.suffix, options.require_checksum, sorted(options.beside.items()))
+    more = options.suffix, options.require_checksum, options.target, sorted(options.beside.items())
+    how = _how(options, *more)
     tasks = []
     reserved = {**known, "": SUMMARY}
     for log, name in output_names(found.logs, reserved).items():
@@ -76,7 +77,7 @@ def plan_logs(found: Found, folder: Path, options: FleetOptions, known: dict[str
         mark = f"{how}:{_state(log, beside)}"
         plain = dict(options.columns)
         task = (name, str(log), mark, output, str(folder), options.clean, plain, beside)
-        tasks.append(LogTask(*task, options.require_checksum))
+        tasks.append(LogTask(*task, options.require_checksum, options.target))
     return Planned(tuple(tasks))
 
 

@@ -1,13 +1,14 @@
 """A stream of many tracks with the state of each kept by Spark, by ``transformWithStateInPandas``.
 
 Rows wait until the watermark has passed their time, and are then pushed in the order of time into
-`surefix.pipelines.stream`, whose snapshot is the state. What comes later than the watermark allows
+`surefix.pipelines.session`, whose snapshot is the state. What comes later than the watermark allows
 is not lost: it is pushed late, and judged as a late row of a log is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pyarrow as pa
@@ -19,7 +20,9 @@ from surefix.fleet.spark_plan import plan_frame, result_schema, told, with_error
 from surefix.fleet.tracks import TrackPlan, track_log, track_rows
 from surefix.io.columns import recognise
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.stream import Stream, begin_stream, end, push, restored, snapshot
+from surefix.pipelines.session import advance, begin_session
+from surefix.pipelines.snapshot import restored, snapshot
+from surefix.pipelines.state import Session
 from surefix.types import Cleaned
 
 if TYPE_CHECKING:
@@ -75,7 +78,10 @@ def stream_tracks(
     MissingExtraError, ParseError, OptionsError
         PySpark is missing, columns or options are wrong, or the state store is not RocksDB.
     """
-    begin_stream(options)
+    if options.mode != "realtime":
+        raise OptionsError(
+            f"mode {options.mode} for a stream", "mode realtime", "the others look ahead"
+        )
     plan = plan_frame(frame, track, options, columns)
     for name, value in (("late_s", late_s), ("idle_s", idle_s)):
         if value < 0.0:
@@ -139,13 +145,16 @@ class _State(NamedTuple):
         µs, time of the latest row.
     timer
         ms, when the track is looked at again; −1 for never.
+    records
+        How many rows were pushed.
     stored
-        Snapshot of the stream; empty before it begins.
+        Snapshot of the session; empty before it begins.
     """
 
     waiting: int = 0
     latest: int = _NEVER
     timer: int = -1
+    records: int = 0
     stored: bytes = b""
 
 
@@ -171,7 +180,7 @@ class Tracks:
         self._handle = handle
         self._rows = handle.getListState("rows", "part binary")
         self._state = handle.getValueState(
-            "state", "waiting long, latest long, timer long, stored binary"
+            "state", "waiting long, latest long, timer long, records long, stored binary"
         )
 
     def handleInputRows(  # the name is Spark's
@@ -253,29 +262,38 @@ class Tracks:
     def _pushed(
         self, track: Any, state: _State, rows: pa.Table
     ) -> tuple[_State, list[pd.DataFrame]]:
-        stream = restored(state.stored) if state.stored else begin_stream(self._plan.options)
         if not rows.num_rows:
             return state, []
+        session = self._session(track, state)
         try:
             log = track_log(rows.drop_columns([_EVENT]), self._plan, str(track))
-            found = [self._shown(track, part) for part in push(stream, log)]
+            if log.fixes is not None:
+                log = replace(log, fixes=log.fixes._replace(row=log.fixes.row + state.records))
+            session, parts = advance(session, 0, log)
+            found = self._shown(track, parts)
         except Exception as error:
-            return state._replace(stored=b""), [self._failed(track, error)]
-        return state._replace(stored=snapshot(stream)), [each for each in found if len(each)]
+            return state._replace(records=0, stored=b""), [self._failed(track, error)]
+        records = state.records + rows.num_rows
+        return state._replace(records=records, stored=snapshot(session)), found
 
     def _ended(self, track: Any, state: _State) -> list[pd.DataFrame]:
         if not state.stored:
             return []
-        stream: Stream = restored(state.stored)
+        session = self._session(track, state)
         try:
-            found = [self._shown(track, part) for part in end(stream)]
+            return self._shown(track, advance(session, 0, None)[1])
         except Exception as error:
             return [self._failed(track, error)]
-        return [each for each in found if len(each)]
 
-    def _shown(self, track: Any, part: Cleaned) -> pd.DataFrame:
+    def _session(self, track: Any, state: _State) -> Session:
+        if state.stored:
+            return restored(state.stored, Session)
+        return begin_session([(str(track), "fixes")], self._plan.options)
+
+    def _shown(self, track: Any, parts: Sequence[Cleaned]) -> list[pd.DataFrame]:
         value = pa.scalar(track, self._plan.kind)
-        return with_error(track_rows(part, value, self._plan), self._plan).to_pandas()
+        tables = [track_rows(part, value, self._plan) for part in parts if len(part.track.time)]
+        return [with_error(rows, self._plan).to_pandas() for rows in tables]
 
     def _failed(self, track: Any, error: Exception) -> pd.DataFrame:
         return told(track, failed_outcome(str(track), error), self._plan).to_pandas()

@@ -14,9 +14,8 @@ from surefix.fleet.outcome import Outcome, cleaned_outcome, failed_outcome
 from surefix.io.columns import recognise
 from surefix.io.records import Batch, Form, empty, table
 from surefix.io.table import from_frame
-from surefix.pipelines.clean import clean_sources
+from surefix.pipelines.clean import Source, clean_sources
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.rows import Source
 from surefix.report.headline import counts
 from surefix.types import Cleaned, IntArray, Log
 

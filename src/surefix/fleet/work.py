@@ -33,6 +33,7 @@ class LogTask(NamedTuple):
     columns: dict[str, str]
     beside: dict[str, str]
     require_checksum: bool
+    target: str | None
 
 
 class TrackTask(NamedTuple):
@@ -71,6 +72,7 @@ def _log(task: LogTask) -> Done:
         velocity=task.beside.get("velocity"),
         heading=task.beside.get("heading"),
         require_checksum=task.require_checksum,
+        target=task.target,
     )
     folder = Path(task.folder)
     done = deliver(clean_batches(sources, task.options), [folder / task.output], iso=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+from surefix.io.acoustic_sentence import PROPRIETARY, UnknownCoordinatesError
 from surefix.io.nmea_record import Record, Refused
 from surefix.io.nmea_sentence import LAYOUTS, Layout, OutOfRangeError
 
@@ -77,10 +78,13 @@ def parse(sentence: bytes, *, require_checksum: bool = True) -> Record | Refused
         return Refused("binary", "")
     comma = text.find(",")
     layout = LAYOUTS.get(text[2:5]) if comma == 5 and text[0] != "P" else None
-    if layout is None:
+    own = PROPRIETARY.get(text[:comma]) if layout is None else None
+    known = layout or own
+    if known is None:
         return _unknown(text[:comma] if comma >= 0 else text)
-    cut = len(body) == len(sentence) - 1 and text.count(",") < layout.commas
-    return _read(text, layout) if not cut else Refused("truncated", "")
+    if len(body) == len(sentence) - 1 and text.count(",") < known.commas:
+        return Refused("truncated", "")
+    return _read(text, known) if own is None else _read_own(text, comma, own)
 
 
 @lru_cache(maxsize=256)
@@ -94,9 +98,23 @@ def _read(text: str, layout: Layout) -> Record | Refused:
     match = layout.pattern.fullmatch(text, 5)
     if match is None or not text[:2].isupper():
         return Refused("truncated" if text.count(",") < layout.commas else "field", "")
+    return _built(layout, text[:2], text[2:5], match)
+
+
+def _read_own(text: str, comma: int, layout: Layout) -> Record | Refused:
+    """What a maker's own sentence says; it has no talker."""
+    match = layout.pattern.fullmatch(text, comma)
+    if match is None:
+        return Refused("truncated" if text.count(",") < layout.commas else "field", "")
+    return _built(layout, "", text[:comma], match)
+
+
+def _built(layout: Layout, talker: str, kind: str, match: re.Match[str]) -> Record | Refused:
     try:
-        return layout.build(text[:2], text[2:5], match.groups(""))
+        return layout.build(talker, kind, match.groups(""))
     except OutOfRangeError as error:
         return Refused("range", str(error))
+    except UnknownCoordinatesError as error:
+        return Refused("coordinates", str(error))
     except ValueError as error:
         return Refused("field", str(error))

@@ -8,10 +8,12 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from surefix.io.nmea import MAX_LENGTH
 from surefix.io.nmea_record import ProblemKind
 
-__all__ = ["START", "Frame", "Framing", "finish", "foreign", "frame"]
+__all__ = ["MAX_LINE", "START", "Frame", "Framing", "finish", "foreign", "frame"]
+
+MAX_LINE = 4096
+"""Longest line kept whole, bytes: instruments that speak JSON write more than 1024."""
 
 _SENTENCE = re.compile(rb"[$!](?:[Pp][A-Za-z0-9]{2,}|[A-Za-z][A-Za-z0-9]{4})[,*]")
 _CHECKED = re.compile(rb"\*[0-9A-Fa-f]{2}")
@@ -26,7 +28,7 @@ class Framing(NamedTuple):
     Parameters
     ----------
     rest
-        Bytes of the unfinished line, at most 1024.
+        Bytes of the unfinished line, at most `MAX_LINE`.
     line
         Number of that line, from 1.
     skipping
@@ -92,11 +94,11 @@ def frame(state: Framing, data: bytes) -> tuple[Framing, list[Frame]]:
         return Framing(b"", number, False, returned), frames
     rest = b"" if data[-1:] in (b"\r", b"\n") else lines.pop()
     for line in lines:
-        whole = len(line) <= MAX_LENGTH
+        whole = len(line) <= MAX_LINE
         _add(frames, number, line if whole else _shorten(frames, number, line)[0])
         number += 1
     skipping = False
-    if len(rest) > MAX_LENGTH:
+    if len(rest) > MAX_LINE:
         rest, skipping = _shorten(frames, number, rest)
     return Framing(rest, number, skipping, returned), frames
 
@@ -109,12 +111,12 @@ def finish(state: Framing) -> list[Frame]:
 def _shorten(frames: list[Frame], number: int, line: bytes) -> tuple[bytes, bool]:
     """Cut an overlong line at starts of sentences; its last piece, and whether to skip on.
 
-    Every cut follows from the first 1025 bytes after the one before it, never from how much of the
-    line has already come: so the pieces do not depend on how the stream was split.
+    Every cut follows from the first `MAX_LINE` + 1 bytes after the one before it, never from how
+    much of the line has already come: so the pieces do not depend on how the stream was split.
     """
     at = 0
-    while len(line) - at > MAX_LENGTH:
-        end = at + MAX_LENGTH
+    while len(line) - at > MAX_LINE:
+        end = at + MAX_LINE
         cut = max(line.rfind(b"$", at + 1, end), line.rfind(b"!", at + 1, end))
         if cut >= 0:
             _add(frames, number, line[at:cut])

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from surefix.errors import InputError
+from surefix.io.acoustic_clock import CALENDAR, DeviceClock
+from surefix.io.acoustic_line import read_line
+from surefix.io.acoustic_plan import Plan, described, is_acoustic, plan_of
+from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
+from surefix.io.acoustic_rows import Sightings
 from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
 from surefix.io.nmea_epoch import Epochs
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
+from surefix.io.nmea_lines import Plain, pieces
 from surefix.io.nmea_record import (
     REMEDIES,
     AlongSpeed,
@@ -30,10 +36,15 @@ from surefix.io.nmea_record import (
 )
 from surefix.types import Channel, Event, Log, Problem
 
-__all__ = ["read_nmea", "sniff"]
+__all__ = ["NmeaStream", "read_nmea", "sniff"]
 
 _BLOCK = 1 << 18
 _STEP = 256  # frames between two looks at the size of a chunk
+_UNDATED = 500  # rows of a stream that wait for the first date
+_STATE = (
+    "_framing", "_clock", "_epochs", "_devices", "_samples", "_channels", "_counts", "_problems",
+    "_reported", "_line",
+)  # fmt: skip
 _SAMPLES_PER_FIX = 10  # a chunk also ends after so many channel samples per fix it may hold
 _ANGLES = frozenset({"heading_deg", "heading_magnetic_deg", "course_deg"})
 _SHARE = 0.3
@@ -54,7 +65,7 @@ def sniff(head: bytes) -> bool:
     for _, _, text, problem in [*frames, *finish(state)]:
         if problem in ("binary", "too-long") or text.startswith(b"#"):
             continue
-        known = problem is None and _plausible(text)
+        known = _plausible(text) if problem is None else read_line(text) is not None
         good += known
         other += not known
     return good > 0 and good >= _SHARE * (good + other)
@@ -71,6 +82,7 @@ def read_nmea(
     path: Path,
     *,
     require_checksum: bool = True,
+    target: str | None = None,
     chunk_fixes: int = 50_000,
     progress: Callable[[int], None] | None = None,
 ) -> Iterator[Log]:
@@ -79,7 +91,9 @@ def read_nmea(
     Each sentence counts at its own UTC time of day, with the date nearest to its time of reception
     or, in a bare log, to the last date met. Sentences without a time get the time of reception, or
     that of the latest sentence with one. A log without any date counts from midnight of its first
-    day. Clock steps and repeated epochs are left as they are: to judge them is not reading.
+    day. In a log of an acoustic positioning system the fixes are those of one transponder, see
+    `surefix.io.acoustic_plan`. Clock steps and repeated epochs are left as they are: to judge them
+    is not reading.
 
     Parameters
     ----------
@@ -87,6 +101,8 @@ def read_nmea(
         The log.
     require_checksum
         False accepts sentences without a checksum. A wrong one is never accepted.
+    target
+        Which transponder, or ``ship``; default the one that is seen most often.
     chunk_fixes
         Rows of fixes per chunk, about.
     progress
@@ -96,19 +112,22 @@ def read_nmea(
     ------
     InputError
         If the file cannot be read.
+    OptionsError
+        If the log has no such target.
     """
-    reader = _Reader(path, require_checksum)
+    plan = _plan(path, require_checksum, target)
+    reader = NmeaStream(path, require_checksum, plan)
     state, done, given = START, 0, 0
     step = min(max(chunk_fixes, 1), _STEP)
     try:
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
-                state, frames = frame(state, block)
-                for at in range(0, len(frames), step):
-                    reader.add(frames[at : at + step])
-                    if reader.size >= chunk_fixes:
-                        yield reader.chunk()
-                        given += 1
+                for state, found in pieces(state, block):
+                    for at in range(0, len(found), step):
+                        reader.add(found[at : at + step])
+                        if reader.size >= chunk_fixes:
+                            yield reader.chunk()
+                            given += 1
                 done += len(block)
                 if progress is not None:
                     progress(done)
@@ -120,21 +139,46 @@ def read_nmea(
         yield rest
 
 
-class _Reader:
-    """What has been read and not yet given out."""
+def _plan(path: Path, require_checksum: bool, target: str | None) -> Plan | None:
+    try:
+        if target is None and not is_acoustic(path):
+            return None
+        return plan_of(path, require_checksum=require_checksum, target=target)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}", "a readable file") from error
 
-    def __init__(self, path: Path, require_checksum: bool) -> None:
+
+class NmeaStream:
+    """A log that comes in pieces, cut anywhere: what has been read and not yet given out.
+
+    Parameters
+    ----------
+    path
+        Its name, which the names of sensors begin with.
+    require_checksum
+        As for `read_nmea`.
+    plan
+        Which acoustic target's sightings are its fixes, and how; None: those of its receivers.
+    """
+
+    def __init__(self, path: Path, require_checksum: bool = True, plan: Plan | None = None) -> None:
         self._path = path
+        self._framing = START
+        self._arrival = math.nan
         self._require_checksum = require_checksum
         self._clock = LogClock()
-        self._epochs = Epochs()
+        self._plan = plan
+        self._sightings = None if plan is None else Sightings(plan)
+        self._epochs = Epochs() if self._sightings is None else self._sightings
+        self._led = math.nan  # time that a device has given to the log
+        self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
         self._samples = 0
         self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
         self._reported: set[str] = set()
         self._line = 0
-        self._take: dict[type, Callable[..., None]] = {
+        self._take: dict[type, Callable[..., bool | None]] = {
             Position: self._position,
             Motion: self._motion,
             Heading: self._heading,
@@ -143,37 +187,91 @@ class _Reader:
             Depth: self._depth,
             Clock: self._time,
             Sigma: self._epochs.declare,
+            Sighting: self._sighting,
+            Attitude: self._attitude,
+            BodyVelocity: self._body_velocity,
         }
+
+    @property
+    def state(self) -> dict[str, object]:
+        """What it remembers, plain data that can be stored; `resume` goes on from it."""
+        return {name: getattr(self, name) for name in _STATE}
+
+    def resume(self, state: Mapping[str, object]) -> None:
+        """Go on from a state of a stream of the same name and plan."""
+        for name in _STATE:
+            setattr(self, name, state[name])
+        self._take[Sigma] = self._epochs.declare
 
     @property
     def size(self) -> float:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
-    def add(self, frames: Sequence[Frame]) -> None:
-        """Read the next frames."""
-        for item in frames:
-            self._add(item)
+    def read(self, data: bytes, arrival: float = math.nan) -> Log:
+        """Read the next piece and give the rows that are complete.
+
+        As long as there is no date, up to 500 rows wait for one.
+
+        Parameters
+        ----------
+        data
+            The piece.
+        arrival
+            s, Unix, when it arrived; it is the time of reception of lines that do not say one.
+        """
+        self._arrival = arrival
+        self._framing, frames = frame(self._framing, data)
+        self.add(frames)
+        if self._clock.dated or self.size >= _UNDATED:
+            return self.chunk()
+        return Log(source=str(self._path))
+
+    def rest(self) -> Log:
+        """Read the line without an end, if there is one, and give all rows."""
+        self.add(finish(self._framing))
+        self._framing = START
+        return self.chunk(last=True)
+
+    def add(self, found: Sequence[Frame | Plain]) -> None:
+        """Read the next frames or plain lines."""
+        for item in found:
+            if len(item) == 3:
+                self._line, self._clock.receive, record = item
+                self._heed(record)
+            else:
+                self._add(item)
 
     def _add(self, item: Frame) -> None:
         line, prefix, text, problem = item
         if prefix:
             self._received(line, prefix)
         elif line != self._line:
-            self._clock.receive = math.nan
+            self._clock.receive = self._arrival
         self._line = line
-        if problem is not None:
-            self._problem(problem, line, text)
-            return
-        record = parse(text, require_checksum=self._require_checksum)
-        if isinstance(record, Refused):
-            if record.kind != "unknown-type":
-                self._problem(record.kind, line, text)
-            else:
-                self._counts[record.text] = self._counts.get(record.text, 0) + 1
-            return
-        self._counts[record.type] = self._counts.get(record.type, 0) + 1
-        self._take[record.__class__](record)
+        if problem is None:
+            record = parse(text, require_checksum=self._require_checksum)
+        else:
+            told = read_line(text) if problem == "not-nmea" else None
+            if told is None:
+                self._problem(problem, line, text)
+                return
+            before, record = told
+            if before:
+                self._received(line, before.strip())
+        if not isinstance(record, Refused):
+            if self._heed(record) is False:
+                self._problem("other-target", line, text)
+        elif record.kind == "unknown-type":
+            self._heed(record.text)
+        else:
+            self._problem(record.kind, line, text)
+
+    def _heed(self, record: Record | str) -> bool | None:
+        """Take a record in, or count the type of one that is not known; False: of no target."""
+        kind = record if isinstance(record, str) else record.type
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        return None if isinstance(record, str) else self._take[record.__class__](record)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""
@@ -182,16 +280,23 @@ class _Reader:
             fixes=self._epochs.take(last),
             sensors=tuple(f"{self._path.stem} {name}" for name in self._epochs.sources),
             channels=tuple(self._series()),
-            problems=tuple(
-                Problem(kind, total, example, REMEDIES[kind])
-                for kind, (total, example) in self._problems.items()
-            ),
+            problems=tuple(self._told()),
             events=tuple(self._events()),
             counts=self._counts,
+            depth_positive_down=self._sightings is not None,
         )
         self._channels, self._samples, self._problems, self._counts = {}, 0, {}, {}
         self._clock.settle()
         return log
+
+    def _told(self) -> Iterator[Problem]:
+        for kind, (total, example) in self._problems.items():
+            yield Problem(kind, total, example, REMEDIES[kind])
+        lost = self._sightings.lost if self._sightings is not None else []
+        if lost and self._plan is not None:
+            example = f"{self._plan.target} at {lost[0]:.1f} s"
+            yield Problem("unplaced", len(lost), example, REMEDIES["unplaced"])
+            lost.clear()
 
     def _series(self) -> Iterator[Channel]:
         for (name, sensor), (time, value) in self._channels.items():
@@ -204,6 +309,9 @@ class _Reader:
             )
 
     def _events(self) -> Iterator[Event]:
+        if self._plan is not None and "plan" not in self._reported:
+            self._reported.add("plan")
+            yield Event("note", math.nan, described(self._plan))
         count = self._clock.rollovers
         if count and "rollover" not in self._reported:
             self._reported.add("rollover")
@@ -262,7 +370,41 @@ class _Reader:
         self._epochs.move(record, self._clock.receive)
         self._samples_of(record, speed_mps=record.speed, course_deg=record.course)
 
+    def _sighting(self, record: Sighting) -> bool | None:
+        """Take a sighting; False if it is of another target than that of the plan."""
+        if math.isnan(record.measured):
+            time = self._instant(record.second, record.day)
+        else:
+            time = self._device(record.type, record.measured, record.told)
+        return None if self._sightings is None else self._sightings.see(record, time)
+
+    def _attitude(self, record: Attitude) -> None:
+        time = self._instant(record.second, None)
+        self._sample("heading_deg", record.type, time, record.heading)
+        if self._sightings is not None:
+            self._sightings.turn(record.type, record.heading, time)
+
+    def _body_velocity(self, record: BodyVelocity) -> None:
+        time = self._device(record.type, record.measured, record.told)
+        self._sample("forward_mps", record.type, time, record.forward)
+        self._sample("starboard_mps", record.type, time, record.starboard)
+        self._sample("down_mps", record.type, time, record.down)
+        self._sample("velocity_sigma_mps", record.type, time, record.sigma)
+
+    def _device(self, name: str, measured: float, told: float) -> float:
+        """Instant of a measurement; a device's calendar dates a log that has no time yet."""
+        now = self._clock.now()
+        if not math.isnan(now) and now != self._led:
+            return self._devices[name].at(measured, told, now)
+        if measured < CALENDAR:
+            return math.nan
+        self._led = self._clock.latest = measured
+        self._clock.dated = True
+        return measured
+
     def _heading(self, record: Heading) -> None:
+        if self._sightings is not None:
+            self._sightings.turn(record.type, record.true, self._clock.now())
         if record.type in ("HDT", "THS") or not math.isnan(record.true):
             self._samples_of(record, heading_deg=record.true)
         else:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple
 
+from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
+
 __all__ = [
     "REMEDIES",
     "AlongSpeed",
@@ -33,6 +35,9 @@ ProblemKind = Literal[
     "too-long",
     "binary",
     "not-nmea",
+    "coordinates",
+    "other-target",
+    "unplaced",
     "unknown-type",
 ]
 
@@ -42,9 +47,12 @@ REMEDIES: dict[ProblemKind, str] = {
     "truncated": "the logger lost part of the line; check its buffer and the baud rate",
     "field": "a field is not what the sentence type says; check the version of the device",
     "range": "a value is impossible, such as latitude 91; the sentence is left out",
-    "too-long": "no end of line for 1024 bytes: is this port set to a binary protocol?",
+    "too-long": "over 1024 bytes, or 4096 without end of line: is this a binary protocol?",
     "binary": "another protocol shares this log; only its NMEA sentences are read",
     "not-nmea": "other lines share this log; only its NMEA sentences are read",
+    "coordinates": "set the output to Cartesian coordinates, UTM, radians or degrees",
+    "other-target": "fixes of one target at a time: choose it with --target NAME",
+    "unplaced": "the ship's position (GGA, RMC) or heading (HDT, PSIMSNS) is missing at that time",
     "unknown-type": "",
 }
 """What the user can do about each kind of problem."""
@@ -146,4 +154,16 @@ class Refused(NamedTuple):
     text: str
 
 
-Record = Position | Motion | Heading | WaterSpeed | AlongSpeed | Depth | Clock | Sigma
+Record = (
+    Position
+    | Motion
+    | Heading
+    | WaterSpeed
+    | AlongSpeed
+    | Depth
+    | Clock
+    | Sigma
+    | Attitude
+    | BodyVelocity
+    | Sighting
+)

@@ -16,15 +16,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from surefix.errors import InputError, OptionsError, ParseError
+from surefix.errors import OptionsError
+from surefix.io.toml_file import read_toml
 
 __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
+_LIVE = ("input", "output", "journal")  # of surefix live, whose file holds for surefix clean too
 _SENSOR_KEYS = ("delay_s", "sigma")
 
 
@@ -46,13 +47,10 @@ def read_options(path: str | Path) -> OptionsFile:
         A table or key is not known, or a value has the wrong type.
     """
     place = Path(path)
-    try:
-        content = tomllib.loads(place.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"{place}: {error.strerror}", "a readable TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParseError(f"{place}: {error}", "a TOML file") from error
+    content = read_toml(place)
     for name, value in content.items():
+        if name in _LIVE:
+            continue
         if name not in _TABLES or not isinstance(value, dict):
             raise OptionsError(
                 f"{place}: {name!r}", "the tables " + ", ".join(f"[{t}]" for t in _TABLES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from surefix.reasons import texts
 from surefix.types import (
     AXES,
+    BoolArray,
     CleanedChannel,
     FloatArray,
     IntArray,
@@ -20,9 +22,10 @@ from surefix.types import (
     Verdicts,
 )
 
-__all__ = ["Batch", "Form", "channel_table", "empty", "table"]
+__all__ = ["Batch", "Form", "believed", "channel_table", "empty", "parts", "table"]
 
-_WORDS = np.array([verdict.name.lower() for verdict in Verdict], dtype=object)
+_WITH_A_PART = (Verdict.USED, Verdict.DOWNWEIGHTED, Verdict.EDITED)
+_WORDS = [verdict.name.lower() for verdict in Verdict]
 
 
 class Form(NamedTuple):
@@ -49,8 +52,8 @@ class Form(NamedTuple):
 class Batch(NamedTuple):
     """Some epochs of a track, and for each the verdict, sensor name and record number of its fix.
 
-    ``coordinates`` (n, 3) are the fixes as they were given: latitude, longitude, height. All but
-    the track are None for a track at times of its own.
+    ``coordinates`` (n, 3) are the fixes as they were given: latitude, longitude, height. ``known``
+    (n,) is False where no fix supports a track at times of its own; the others are None for one.
     """
 
     track: Track
@@ -59,6 +62,27 @@ class Batch(NamedTuple):
     sensor: IntArray | None = None
     row: IntArray | None = None
     coordinates: FloatArray | None = None
+    known: BoolArray | None = None
+
+
+def believed(verdicts: Verdicts) -> BoolArray:
+    """(n,) True where the fix had a part in the track, be it that the user wanted it so."""
+    part = np.isin(verdicts.verdict, _WITH_A_PART)
+    return np.asarray(part & (verdicts.weight > 0.0), dtype=np.bool_)
+
+
+def parts(batch: Batch, rows: int) -> Iterator[Batch]:
+    """Cut a batch into parts of so many epochs, so that little of it is in words at one time."""
+    for at in range(0, max(len(batch.track.time), 1), rows):
+        some = slice(at, at + rows)
+        yield Batch._make(
+            value[some]
+            if isinstance(value, np.ndarray)
+            else value._make(None if column is None else column[some] for column in value)
+            if isinstance(value, Track | Verdicts)
+            else value
+            for value in batch
+        )
 
 
 def table(batch: Batch, form: Form) -> pa.Table:
@@ -77,8 +101,7 @@ def table(batch: Batch, form: Form) -> pa.Table:
         unknown = np.full_like(track.position, np.nan)
         columns |= _globe(unknown if track.geodetic is None else track.geodetic, form)
     if batch.sensor is not None:
-        names = np.array(batch.sensors, dtype=object)
-        columns["sensor"] = pa.array(names[batch.sensor], pa.string())
+        columns["sensor"] = _words(batch.sensor, batch.sensors)
     if batch.row is not None:
         columns["row"] = pa.array(batch.row, pa.int64())
     return pa.table(columns)
@@ -122,22 +145,29 @@ def _time(time: FloatArray, form: Form) -> pa.Array:
 
 def _verdicts(verdicts: Verdicts) -> dict[str, pa.Array]:
     return {
-        "verdict": pa.array(_WORDS[verdicts.verdict], pa.string()),
+        "verdict": _words(verdicts.verdict, _WORDS),
         "weight": _floats(verdicts.weight),
         "innovation_sigma": _floats(verdicts.innovation_sigma),
-        "reason": pa.array(_reasons(verdicts), pa.string()),
+        "reason": _reasons(verdicts),
     }
 
 
-def _reasons(verdicts: Verdicts) -> list[str]:
+def _reasons(verdicts: Verdicts) -> pa.Array:
     """Put the verdicts into words; those that agree, nearly all, share one text."""
-    agrees = verdicts.reason == Reason.AGREES
-    others = Verdicts(*(values[~agrees] for values in verdicts))
-    first = Verdicts(*(values[agrees][:1] for values in verdicts))
-    found = np.empty(len(agrees), dtype=object)
-    found[agrees] = texts(first)[0] if agrees.any() else ""
-    found[~agrees] = texts(others)
-    return list(found)
+    others = np.flatnonzero(verdicts.reason != Reason.AGREES)
+    agrees = np.flatnonzero(verdicts.reason == Reason.AGREES)[:1]
+    shown = np.concatenate([agrees, others])
+    index = np.zeros(len(verdicts.reason), dtype=np.int64)
+    index[others] = np.arange(len(agrees), len(shown))
+    return _words(index, texts(Verdicts(*(values[shown] for values in verdicts))))
+
+
+def _words(index: IntArray, words: Sequence[str]) -> pa.Array:
+    """Text by its place in a list."""
+    coded = pa.DictionaryArray.from_arrays(
+        pa.array(index, pa.int64()), pa.array(words, pa.string())
+    )
+    return coded.cast(pa.string())
 
 
 def _globe(geodetic: FloatArray, form: Form) -> dict[str, pa.Array]:

@@ -50,7 +50,16 @@ def _printed(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
         return pc.add(rounded, 0.0)  # −0 becomes 0
     if pa.types.is_timestamp(kind):
         return pc.replace_substring(column.cast(pa.string()), " ", "T")
-    return escaped(column) if pa.types.is_string(kind) else column
+    return _words(column) if pa.types.is_string(kind) else column
+
+
+def _words(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Text to be printed; what occurs more than once, such as a verdict, is looked at once."""
+    coded = column.combine_chunks().dictionary_encode()
+    words = escaped(pa.chunked_array([coded.dictionary])).combine_chunks()
+    return pa.chunked_array(
+        [pa.DictionaryArray.from_arrays(coded.indices, words).cast(column.type)]
+    )
 
 
 def escaped(column: pa.ChunkedArray) -> pa.ChunkedArray:

@@ -7,15 +7,12 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from surefix.errors import OutputError
-from surefix.io import write_csv, write_parquet
 from surefix.io.atomic import replacing
+from surefix.io.writers import table_sink
 from surefix.reasons import texts
 from surefix.types import AXES, FloatArray, IntArray, Verdict, Verdicts
 
 __all__ = ["position_table", "verdict_table", "write_rows"]
-
-_SUFFIXES = (".csv", ".parquet")
 
 
 def position_table(
@@ -85,13 +82,6 @@ def write_rows(path: str | Path, rows: pa.Table) -> None:
         The suffix is neither ``.csv`` nor ``.parquet``, or the file cannot be written.
     """
     place = Path(path)
-    suffix = place.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise OutputError(
-            f"{place}: {place.suffix or 'no suffix'} is not a format this is written in",
-            "one of " + ", ".join(_SUFFIXES),
-            "change the suffix of the output",
-        )
-    sink = write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
+    sink = table_sink(place)
     with replacing(place) as file, sink(file, rows.schema) as add:
         add(rows)

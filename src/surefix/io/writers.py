@@ -3,8 +3,8 @@
 ``.csv`` and ``.parquet`` hold, in this order: ``time, x, y, z, vx, vy, vz, sigma_x, sigma_y,
 sigma_z, verdict, weight, innovation_sigma, reason``; for geographic input ``lat, lon`` and
 ``depth`` (positive down) or ``height``; then ``sensor`` and ``row``. An axis that was never
-observed stays as an empty column. ``.geojson`` and ``.gpx`` need geographic input; see their
-modules. Every file is written whole or not at all.
+observed stays as an empty column. ``.geojson``, ``.gpx`` and ``.nmea`` need geographic input; see
+their modules. Every file is written whole or not at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import pyarrow as pa
 from surefix.errors import OutputError
 from surefix.io import write_csv, write_parquet
 from surefix.io.atomic import replacing
-from surefix.io.records import Batch, Form, channel_table
+from surefix.io.records import Batch, Form, channel_table, parts
 from surefix.types import Cleaned, CleanedChannel, FloatArray, IntArray, Track, Verdicts
 
 __all__ = [
@@ -27,14 +27,17 @@ __all__ = [
     "TrackWriter",
     "channel_writer",
     "resampled_writer",
+    "table_sink",
     "track_writer",
     "write_channel",
     "write_cleaned",
 ]
 
-SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx")
+SUFFIXES = (".csv", ".parquet", ".geojson", ".gpx", ".nmea")
 
+_ROWS = 250_000  # epochs that are put into words at a time
 _Add = Callable[[Batch], None]
+_AddRows = Callable[[pa.Table], None]
 
 
 class TrackWriter:
@@ -65,7 +68,9 @@ class TrackWriter:
             (n, 3) the fixes as they were given, latitude deg, longitude deg, height m: where
             GeoJSON and GPX put them. None: on the track (GeoJSON) or nowhere (GPX).
         """
-        self._add(Batch(track, verdicts, tuple(sensors), sensor, row, coordinates))
+        whole = Batch(track, verdicts, tuple(sensors), sensor, row, coordinates)
+        for part in parts(whole, _ROWS):
+            self._add(part)
 
 
 @contextlib.contextmanager
@@ -118,13 +123,15 @@ def write_cleaned(path: str | Path, cleaned: Cleaned, *, iso: bool = False) -> N
 @contextlib.contextmanager
 def resampled_writer(
     path: str | Path, *, geographic: bool, has_depth: bool = False, iso: bool = False
-) -> Iterator[Callable[[Track], None]]:
+) -> Iterator[Callable[..., None]]:
     """Open a file for a track at times of its own and give the function that writes parts of it.
+
+    The function takes a part and, for NMEA, whether a fix supports each of its epochs.
 
     Columns: time … sigma_z, then lat, lon, depth or height; arguments and errors as `track_writer`.
     """
     with _opened(Path(path), Form(geographic, has_depth, iso, verdicts=False)) as add:
-        yield lambda track: add(Batch(track))
+        yield lambda track, known=None: add(Batch(track, known=known))
 
 
 def write_channel(path: str | Path, channel: CleanedChannel, *, iso: bool = False) -> None:
@@ -147,21 +154,32 @@ def channel_writer(
         The suffix is neither ``.csv`` nor ``.parquet``, or the file cannot be written.
     """
     place = Path(path)
-    suffix = place.suffix.lower()
-    if suffix not in SUFFIXES[:2]:
-        raise _unknown(place, SUFFIXES[:2])
+    kind = table_sink(place)
     with replacing(place) as file, contextlib.ExitStack() as stack:
-        sink: Callable[[pa.Table], None] | None = None
+        sink: _AddRows | None = None
 
         def add(channel: CleanedChannel) -> None:
             nonlocal sink
             rows = channel_table(channel, iso=iso)
             if sink is None:
-                kind = write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
                 sink = stack.enter_context(kind(file, rows.schema))
             sink(rows)
 
         yield add
+
+
+def table_sink(place: Path) -> Callable[..., contextlib.AbstractContextManager[_AddRows]]:
+    """Choose what writes a table by the suffix of its file.
+
+    Raises
+    ------
+    OutputError
+        The suffix is neither ``.csv`` nor ``.parquet``.
+    """
+    suffix = place.suffix.lower()
+    if suffix not in SUFFIXES[:2]:
+        raise _unknown(place, SUFFIXES[:2])
+    return write_csv.table_sink if suffix == ".csv" else write_parquet.table_sink
 
 
 @contextlib.contextmanager
@@ -188,6 +206,10 @@ def _sink(suffix: str, file: BinaryIO, form: Form) -> contextlib.AbstractContext
         from surefix.io.write_geojson import geojson_sink
 
         return geojson_sink(file, form)
+    if suffix == ".nmea":
+        from surefix.io.write_nmea import nmea_sink
+
+        return nmea_sink(file, form)
     from surefix.io.write_gpx import gpx_sink
 
     return gpx_sink(file, form)

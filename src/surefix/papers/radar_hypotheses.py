@@ -18,8 +18,7 @@ from surefix.filters.learning import learn, supposed
 from surefix.filters.multi_hypothesis_modes import offline_hypotheses, realtime_hypotheses
 from surefix.filters.noise import NoiseFigures, Observations
 from surefix.filters.records import Epochs, Estimate, Motion
-from surefix.filters.track import by_axis
-from surefix.papers.radar_series import Cartesian, Fusion
+from surefix.papers.radar_series import Cartesian, Fusion, constant_velocity, epochs_of
 from surefix.simulate.radar import RadarFlight
 from surefix.types import BoolArray, FloatArray
 
@@ -51,19 +50,10 @@ def filter_several(
     bank
         From an earlier call, or None.
     """
-    n, axes = series.position.shape
-    motion = _motion(axes, density)
+    axes = series.position.shape[1]
+    motion = constant_velocity(axes, density)
     bank = no_hypotheses(motion) if bank is None else bank
-    known = float(bank.time[0])
-    first = 0.0 if np.isnan(known) else known + dt
-    none = np.full((n, axes), np.nan)
-    epochs = Epochs(
-        np.asarray(first + dt * np.arange(n), dtype=np.float64),
-        np.concatenate([series.position, none], axis=1),
-        np.concatenate([series.variance, np.ones((n, axes))], axis=1),
-        np.full((n, 2 * axes), np.nan),
-        np.zeros(n, np.int64),
-    )
+    epochs = epochs_of(series, dt, float(bank.time[0]))
     sigma = float(np.sqrt(np.median(series.variance)))
     prior = supposed(axes, sigma, 1.0, _SPEED, LONGEST_S)._replace(manoeuvre=0.0)  # they are weak
     after, found = realtime_hypotheses(motion, prior, epochs, bank)
@@ -88,7 +78,7 @@ def fuse_several(
     """
     both = _joined(flight.dt, (a, b))
     process, prior = _learnt(both, density)
-    motion = _motion(3, process**2)
+    motion = constant_velocity(3, process**2)
     told = _told(both, flight)
     found = {}
     for offline in (False, True):
@@ -97,10 +87,6 @@ def fuse_several(
         for name, epochs in ((SEVERAL, scaled), (TOLD_SEVERAL, told)):
             found[name + ending] = _fusion(_estimate(motion, prior, epochs, offline))
     return found
-
-
-def _motion(axes: int, density: float) -> Motion:
-    return Motion(2, axes, np.full(axes, density), by_axis(axes), 2 * axes, 0.0)
 
 
 def _joined(dt: float, radars: tuple[Cartesian, Cartesian]) -> Epochs:

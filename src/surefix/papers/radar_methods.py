@@ -9,15 +9,15 @@ import numpy as np
 from surefix.filters.current_statistical import filter_current
 from surefix.filters.median_recursion import filter_medians, median_recursion
 from surefix.filters.median_step import MedianRecursion
-from surefix.filters.records import Epochs, Motion, Recovery, TrackState
-from surefix.filters.track import by_axis, filter_track, start
+from surefix.filters.records import Recovery, TrackState
+from surefix.filters.track import filter_track, start
 from surefix.fusion.registration import reference_bias, register
 from surefix.fusion.residual_scale import fuse_by_scale, noise_gain
 from surefix.fusion.track import inverse_covariance
 from surefix.models.radar import unbiased
 from surefix.models.singer import singer
 from surefix.papers.radar_hypotheses import SEVERAL, filter_several, fuse_several
-from surefix.papers.radar_series import Cartesian, Fusion
+from surefix.papers.radar_series import Cartesian, Fusion, constant_velocity, epochs_of
 from surefix.robust.loss import loss_named
 from surefix.simulate.radar import RadarFlight, RadarLog
 from surefix.types import FloatArray
@@ -121,18 +121,10 @@ def filter_cv(
         Weigh by IGG3, and believe what was rejected for 2.5 s on end, as `surefix clean` does.
     """
     recovery, loss = (_LATER, "igg3") if robust else (_NEVER, "kalman")
-    n, axes = series.position.shape
-    motion = Motion(2, axes, np.full(axes, density), by_axis(axes), 2 * axes, 0.0)
+    axes = series.position.shape[1]
+    motion = constant_velocity(axes, density)
     state = start(motion, recovery) if state is None else state
-    first = 0.0 if np.isnan(state.time) else state.time + dt
-    none = np.full((n, axes), np.nan)
-    epochs = Epochs(
-        np.asarray(first + dt * np.arange(n), dtype=np.float64),
-        np.concatenate([series.position, none], axis=1),
-        np.concatenate([series.variance, np.ones((n, axes))], axis=1),
-        np.full((n, 2 * axes), np.nan),
-        np.zeros(n, np.int64),
-    )
+    epochs = epochs_of(series, dt, state.time)
     state, found, _ = filter_track(motion, loss_named(loss), recovery, epochs, state)
     rows = found.factor[:, :axes]
     return state, found.mean[:, :axes].copy(), np.sum(rows * rows, axis=-1)

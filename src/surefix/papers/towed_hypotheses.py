@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 
+from surefix.filters.hypothesis_review import deleted
 from surefix.filters.learning import supposed
 from surefix.filters.multi_hypothesis_modes import offline_hypotheses
 from surefix.filters.records import Epochs, Motion
@@ -108,7 +109,6 @@ def _series(
 
 def _judged(survey: TowedSurvey, weight: FloatArray, track: TowedTrack) -> FloatArray:
     """Probability of each value that it is right, by its deleted residual."""
-    R = np.square(survey.sigma)
     residual = np.column_stack(
         [
             *offset(*track.mean[:, :2].T, *survey.z[:, :2].T),
@@ -117,9 +117,7 @@ def _judged(survey: TowedSurvey, weight: FloatArray, track: TowedTrack) -> Float
         ]
     )
     P = np.einsum("kii->ki", track.covariance)[:, [0, 1, 4, 5]]
-    own = R / np.maximum(weight, _LEAST)
-    gain = own / np.maximum(own - P, 1e-9 * own)
-    e, S = residual * gain, R + P * gain
+    e, S = deleted(residual, P, np.square(survey.sigma), np.maximum(weight, _LEAST))
     seen, wrong = np.isfinite(e), np.isfinite(e) & (weight < 0.5)
     share = (wrong.sum(axis=0) + _WRONG[0]) / (seen.sum(axis=0) + _WRONG[1])
     scale = np.array([_scale(np.abs(e[wrong[:, c], c]), survey.sigma[c]) for c in range(4)])

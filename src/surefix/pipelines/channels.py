@@ -26,11 +26,9 @@ from surefix.types import (
     Verdict,
 )
 
-__all__ = ["CHANNEL_HEAD", "ChannelState", "clean_channel"]
+__all__ = ["ChannelState", "channel_head", "clean_channel"]
 
-CHANNEL_HEAD = 2000
-"""Values that a series is settled on in real time; the other modes see it whole."""
-
+_HEAD = 2000
 _LAG_VALUES = 20
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
@@ -55,6 +53,11 @@ class ChannelState(NamedTuple):
         return self.held._replace(time=np.empty(0), value=np.empty(0))
 
 
+def channel_head(options: CleanOptions) -> int:
+    """Values that a series is settled on in real time; the other modes see it whole."""
+    return min(_HEAD, options.settle_rows)
+
+
 def clean_channel(
     new: Channel, state: ChannelState, options: CleanOptions, *, final: bool
 ) -> tuple[CleanedChannel, ChannelState]:
@@ -66,7 +69,7 @@ def clean_channel(
         The part, in the order of arrival; may be empty.
     state
         From the part before. Noise is estimated on the head of the first part, in real time on its
-        first `CHANNEL_HEAD` values: twice as many should come before it is begun.
+        first `channel_head` values: twice as many should come before it is begun.
     options
         Mode and method; noise figures of positions do not apply, and ``auto`` is the ``cv`` model,
         which runs away least where a series has lost its sensor.
@@ -87,7 +90,7 @@ def clean_channel(
     raw, tau = value[repaired.order], _filled(repaired.tau)
     state = state._replace(clock=clock, held=held)
     sensor = np.zeros(len(raw), np.int64)
-    head = slice(CHANNEL_HEAD if options.mode == "realtime" else None)
+    head = slice(channel_head(options) if options.mode == "realtime" else None)
     if state.repeats is None:
         state = state._replace(repeats=start_repeats(raw[head, None], sensor[head], 1))
     assert state.repeats is not None

@@ -8,14 +8,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from surefix.errors import OptionsError
+from surefix.io.records import believed
 from surefix.io.writers import SUFFIXES, TrackWriter, channel_writer, resampled_writer, track_writer
 from surefix.pipelines.joining import join, thinned
 from surefix.report.headline import counts
-from surefix.types import Cleaned, CleanedChannel, Event, Track, Verdict
+from surefix.types import BoolArray, Cleaned, CleanedChannel, Event, Track, Verdict
 
 __all__ = ["Delivered", "deliver"]
 
+_INTERVALS = 3.0  # between fixes, after which a track without any is dead reckoning
 _KEPT = 250_000  # rows that are kept for the report and the summary; of more, every k-th
 
 
@@ -92,7 +96,7 @@ class _Files:
     def __init__(self, stack: contextlib.ExitStack, places: list[Path], iso: bool) -> None:
         self._stack, self._places, self._iso = stack, places, iso
         self._tracks: list[TrackWriter] | None = None
-        self._resampled: list[Callable[[Track], None]] = []
+        self._resampled: list[Callable[..., None]] = []
         self._series: dict[tuple[str, str], list[Callable[[CleanedChannel], None]]] = {}
         self.written: list[str] = []
 
@@ -117,7 +121,7 @@ class _Files:
             )
         for write in self._resampled if batch.resampled is not None else ():
             assert batch.resampled is not None
-            write(batch.resampled)
+            write(batch.resampled, _supported(batch, batch.resampled))
 
     def _open(self, batch: Cleaned, geographic: bool) -> list[TrackWriter]:
         enter, places = self._stack.enter_context, self._places
@@ -152,6 +156,17 @@ class _Files:
             self.written += [str(place) for place in places]
         for write in self._series[key]:
             write(channel)
+
+
+def _supported(batch: Cleaned, track: Track) -> BoolArray:
+    """Whether a fix that was believed lies within three usual intervals of each epoch."""
+    used = believed(batch.verdicts) & np.isfinite(batch.track.time)
+    times = np.sort(batch.track.time[used])
+    if not len(times):
+        return np.zeros(len(track.time), np.bool_)
+    after = np.searchsorted(times, track.time)
+    near = [np.abs(times[np.clip(after - k, 0, len(times) - 1)] - track.time) for k in (0, 1)]
+    return np.minimum(*near) <= _INTERVALS * float(batch.settings["interval_s"])
 
 
 def _beside(place: Path, channel: CleanedChannel) -> Path:

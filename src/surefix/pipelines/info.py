@@ -30,13 +30,14 @@ def describe(
     heading: str | Path | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
+    target: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Look a log through and say what is in it, ready for JSON.
 
     Parameters
     ----------
-    inputs, depth, velocity, heading, columns, require_checksum, progress
+    inputs, depth, velocity, heading, columns, require_checksum, target, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
@@ -47,10 +48,13 @@ def describe(
         heading=heading,
         columns=columns,
         require_checksum=require_checksum,
+        target=target,
         progress=progress,
     )
-    for source in sources:
-        source.logs = _counting(source.logs, counts.setdefault(source.name, {}))
+    sources = [
+        source._replace(logs=_counting(source.logs, counts.setdefault(source.name, {})))
+        for source in sources
+    ]
     size = sum(Path(path).stat().st_size for path in inputs)
     mode: Mode = "realtime" if size > _LARGE else "offline"
     cleaned = clean_sources(sources, CleanOptions(mode=mode))
@@ -65,7 +69,12 @@ def describe(
         "problems": found["problems"],
         "command": _command(
             inputs,
-            {"--depth": depth, "--velocity": velocity, "--heading": heading},
+            {
+                "--depth": depth,
+                "--velocity": velocity,
+                "--heading": heading,
+                "--target": target,
+            },
             columns,
             require_checksum,
         ),

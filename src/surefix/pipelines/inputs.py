@@ -14,10 +14,11 @@ from surefix.geo.angle import wrap
 from surefix.geo.local_frame import rotate
 from surefix.io.columns import Role
 from surefix.io.nmea_log import read_nmea, sniff
+from surefix.io.sqlite_file import is_sqlite
 from surefix.io.table import from_frame, read_table
 from surefix.pipelines.channels import ChannelState, clean_channel
+from surefix.pipelines.clean import Source
 from surefix.pipelines.options import CleanOptions
-from surefix.pipelines.rows import Source
 from surefix.types import Channel, Fixes, FloatArray, Log
 
 __all__ = ["Data", "Progress", "open_inputs", "open_log"]
@@ -28,6 +29,7 @@ Data = Any
 Progress = Callable[[int], None]
 _HEAD = 1 << 16
 _BODY = ("forward_mps", "starboard_mps", "down_mps")
+_SIGMA = "velocity_sigma_mps"  # standard deviation that a sensor declares for each of them
 
 
 def open_inputs(
@@ -38,6 +40,7 @@ def open_inputs(
     heading: Data | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
+    target: str | None = None,
     progress: Progress | None = None,
 ) -> list[Source]:
     """Open files, or tables in memory, as sources.
@@ -54,6 +57,9 @@ def open_inputs(
         alone; a plain ``time`` also holds for the other logs that have such a column.
     require_checksum
         False accepts NMEA sentences without a checksum.
+    target
+        Whose fixes are taken from logs of an acoustic positioning system: a transponder, or
+        ``ship``; default the transponder that is seen most often.
     progress
         Told the bytes that were read, over all files.
 
@@ -64,10 +70,15 @@ def open_inputs(
     """
     if not inputs:
         raise OptionsError("no input", "one file or more")
-    opener = _Opener(dict(columns or {}), require_checksum, progress)
+    opener = _Opener(dict(columns or {}), require_checksum, target, progress)
     given = {"depth": depth, "velocity": velocity, "heading": heading}
     opener.check({role for role, data in given.items() if data is not None})
-    sources = [Source(opener.open(data, "fixes"), "fixes", _name(data)) for data in inputs]
+    sources: list[Source] = []
+    for data in inputs:
+        if isinstance(data, str | Path) and is_sqlite(Path(data)):
+            sources += _journalled(Path(data), require_checksum)
+        else:
+            sources.append(Source(opener.open(data, "fixes"), "fixes", _name(data)))
     if depth is not None:
         sources.append(Source(opener.open(depth, "depth"), "depth", _name(depth, "depth")))
     if heading is not None and not any(_same(heading, data) for data in inputs):
@@ -79,6 +90,16 @@ def open_inputs(
         logs = _earth_frame(opener.open(velocity, "velocity"), turning)
         sources.append(Source(logs, "velocity", _name(velocity, "velocity")))
     return sources
+
+
+def _journalled(place: Path, require_checksum: bool) -> list[Source]:
+    """The inputs of a live service from its journal, as they were received."""
+    from surefix.io.journal import journal_logs
+
+    return [
+        Source(logs, role, name)
+        for name, role, logs in journal_logs(place, require_checksum=require_checksum)
+    ]
 
 
 def _name(data: Data, role: str = "table") -> str:
@@ -95,8 +116,13 @@ class _Opener:
     """Opens logs with the columns that are meant for each, and adds up the bytes they report."""
 
     def __init__(
-        self, columns: dict[str, str], require_checksum: bool, progress: Progress | None
+        self,
+        columns: dict[str, str],
+        require_checksum: bool,
+        target: str | None,
+        progress: Progress | None,
     ) -> None:
+        self._target = target
         self._columns, self._require_checksum = columns, require_checksum
         self._progress = progress
         self._done: list[int] = []
@@ -134,6 +160,7 @@ class _Opener:
             role=role,
             columns=columns,
             require_checksum=self._require_checksum,
+            target=self._target if role == "fixes" else None,
             progress=self._next_progress(),
         )
 
@@ -156,6 +183,7 @@ def open_log(
     role: Role = "fixes",
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
+    target: str | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Log]:
     """Open one file with the reader it needs.
@@ -172,17 +200,30 @@ def open_log(
     except OSError as error:
         raise InputError(f"{place}: {error.strerror}", "a readable file") from error
     if sniff(head):
-        return read_nmea(place, require_checksum=require_checksum, progress=progress)
+        logs = read_nmea(place, require_checksum=require_checksum, target=target, progress=progress)
+        return logs if role == "velocity" else map(_without_sigma, logs)
+    if target is not None:
+        raise OptionsError(
+            f"target {target!r} for {place}", "a log of an acoustic positioning system"
+        )
     return read_table(place, mapping=columns, role=role, sensor=place.stem, progress=progress)
+
+
+def _without_sigma(log: Log) -> Log:
+    """A log without the standard deviations of its body velocities: they are no series."""
+    kept = tuple(channel for channel in log.channels if channel.name != _SIGMA)
+    return log if len(kept) == len(log.channels) else replace(log, channels=kept)
 
 
 def _earth_frame(logs: Iterator[Log], turning: list[Log] | None) -> Iterator[Log]:
     """Velocities of the vehicle's own axes turned into east, north, up by its heading."""
     heading: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for log in logs:
-        body = {channel.name: channel for channel in log.channels if channel.name in _BODY}
+        body = {
+            channel.name: channel for channel in log.channels if channel.name in (*_BODY, _SIGMA)
+        }
         if not body:
-            yield log
+            yield log if heading is None else replace(log, fixes=None, channels=())
             continue
         if heading is None:
             heading = _headings(turning, log.source)
@@ -233,6 +274,7 @@ def _turned(
     empty = np.full((n, 3), np.nan)
     zero = np.zeros(n, np.int64)
     velocity = np.column_stack([east, north, -down])
+    sigma = np.column_stack([body[_SIGMA].value] * 3) if _SIGMA in body else empty
     return Fixes(
-        time, empty, velocity, empty, empty, zero, zero, np.ones(n, np.bool_), np.arange(n), False
+        time, empty, velocity, empty, sigma, zero, zero, np.ones(n, np.bool_), np.arange(n), False
     )

@@ -184,14 +184,14 @@ def _adapting(block: _Block) -> FloatArray:
     Sensors of depths and velocities stay as settled: they come so often that what a model misses
     of the motion would be taken for their noise.
     """
-    adapt = np.zeros((MOST_SENSORS, 2))
+    adapt = np.zeros(MOST_SENSORS)
     d = len(block.axes)
     for sensor in range(min(len(block.given.position), MOST_SENSORS)):
         mine = block.observations.sensor == sensor
         placed = np.isfinite(block.observations.z[mine, :d]).any()
         declared = np.isfinite(block.observations.declared[mine, :d]).any()
         if placed and not declared and np.isnan(block.given.position[sensor]):
-            adapt[sensor, 0] = 1.0 / _MEMORY
+            adapt[sensor] = 1.0 / _MEMORY
     return adapt
 
 

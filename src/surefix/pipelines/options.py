@@ -13,21 +13,11 @@ from surefix.filters.deciding import AHEAD, THRESHOLDS, Decider
 from surefix.models.motion import MODELS
 from surefix.robust.loss import LOSSES, Loss, loss_named
 
-__all__ = [
-    "HEAD",
-    "METHODS",
-    "MULTI_HYPOTHESIS",
-    "CleanOptions",
-    "Latency",
-    "Mode",
-    "options_from",
-]
+__all__ = ["METHODS", "MULTI_HYPOTHESIS", "CleanOptions", "Latency", "Mode", "options_from"]
 
 Mode = Literal["realtime", "lagged", "offline"]
 Latency = Literal["report", "remove", "ignore"]
 
-HEAD = 20_000
-"""Rows that a log is settled on in real time, unless the options say otherwise."""
 MULTI_HYPOTHESIS = "multi-hypothesis"
 _CIPRA_ROMERA = "cipra-romera"
 METHODS = (MULTI_HYPOTHESIS, *LOSSES, _CIPRA_ROMERA, *THRESHOLDS)
@@ -81,11 +71,12 @@ class CleanOptions:
     latency
         What is done about fixes that are late against a velocity: ``report`` says so, ``remove``
         also takes the delay off their times (not in real time), ``ignore`` does not look.
+    settle_rows
+        In real time: rows that frame, noise figures and height offsets are settled on before the
+        first result, at least 10. Scalar series are settled on as many values, but no more than
+        2,000.
     held
         Count a position that is polled again only once.
-    settle_rows
-        Rows of all sensors, from the first on, that frame, noise and model are settled on in real
-        time; the other modes see the whole log.
     """
 
     mode: Mode = "offline"
@@ -105,8 +96,8 @@ class CleanOptions:
     every_s: float | None = None
     reorder_s: float = 10.0
     latency: Latency = "report"
+    settle_rows: int = 20_000
     held: bool = True
-    settle_rows: int = HEAD
 
     def __post_init__(self) -> None:
         _one_of("mode", self.mode, get_args(Mode))
@@ -152,10 +143,10 @@ class CleanOptions:
             raise OptionsError(f"false_alarm = {self.false_alarm}", "a share between 0 and 1")
         if _number("reorder_s", self.reorder_s) < 0.0:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
+        if _number("settle_rows", self.settle_rows) < 10 or self.settle_rows % 1:
+            raise OptionsError(f"settle_rows = {self.settle_rows}", "a whole number from 10 on")
         if not isinstance(self.held, bool):
             raise OptionsError(f"held = {self.held!r}", "true or false")
-        if type(self.settle_rows) is not int or self.settle_rows < 2:
-            raise OptionsError(f"settle_rows = {self.settle_rows!r}", "a whole number from 2 on")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import platform
 from dataclasses import fields
 from importlib.metadata import version
@@ -95,5 +96,11 @@ def settings(options: CleanOptions, setup: Setup | None) -> dict[str, str]:
         for name, value in used.items()
         if value is not None and value != {}
     }
-    out["python"] = platform.python_version()
-    return out | {name: version(name) for name in _VERSIONS}
+    return out | _versions()
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    """Versions of what the figures depend on; looked up once, for that takes a while."""
+    found = {name: version(name) for name in _VERSIONS}
+    return {"python": platform.python_version(), **found}

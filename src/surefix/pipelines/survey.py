@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from surefix.errors import InputError, OptionsError, ParseError
+from surefix.errors import OptionsError
 from surefix.filters.sight_records import MOST_CHANNELS
+from surefix.io.toml_file import read_toml
 from surefix.models.sights import BEARING, COMPONENT, ELEVATION, RANGE
 
 __all__ = ["KINDS", "SightSource", "Survey", "read_survey"]
@@ -152,12 +152,7 @@ def read_survey(path: str | Path) -> Survey:
         A key is not known, or a value is wrong.
     """
     place = Path(path)
-    try:
-        content = tomllib.loads(place.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"{place}: {error.strerror}", "a readable TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParseError(f"{place}: {error}", "a TOML file") from error
+    content = read_toml(place)
     sights = content.pop("sight", None)
     if not isinstance(sights, list) or not all(isinstance(each, dict) for each in sights):
         raise OptionsError(f"{place}: no sights", "one table [[sight]] per column")

@@ -1,0 +1,219 @@
+"""Rows of all inputs in one order: clocks repaired per input, then merged by time.
+
+A row is an observation of anything the track filter takes: a fix, a depth, a velocity. Inputs come
+in parts; a row is let go when no input can still bring an earlier one, so that logs larger than
+memory pass through, and the result does not depend on how they were cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.cleaning.clock import ClockState, repair
+from surefix.geo.angle import wrap
+from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.rows import (
+    METRES_PER_DEGREE,
+    Rows,
+    join_fixes,
+    join_rows,
+    take_fixes,
+    take_rows,
+)
+from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
+
+__all__ = ["Chunk", "Merging", "begin_merging", "merge"]
+
+_WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
+
+
+class Chunk(NamedTuple):
+    """What is ready at one time: rows, and what came beside them."""
+
+    rows: Rows | None
+    channels: tuple[Channel, ...]
+    events: tuple[Event, ...]
+    problems: tuple[Problem, ...]
+    has_depth: bool
+
+
+class _Inflow(NamedTuple):
+    """Where one input stands: its clock, rows held back by it, and rows in order."""
+
+    role: str
+    clock: ClockState = ClockState()
+    held: Fixes | None = None
+    ready: tuple[Rows, ...] = ()
+    last_tau: float = -np.inf
+    longitude: float = np.nan
+    ended: bool = False
+
+
+class Merging(NamedTuple):
+    """Where the merging of inputs stands; made by `begin_merging`.
+
+    Parameters
+    ----------
+    inflows
+        One per input.
+    sensors
+        Names of all sensors met so far; ``Fixes.sensor`` indexes them.
+    """
+
+    inflows: tuple[_Inflow, ...]
+    sensors: tuple[str, ...] = ()
+
+    @property
+    def ended(self) -> bool:
+        """Whether every input has come to its end."""
+        return all(inflow.ended for inflow in self.inflows)
+
+    @property
+    def behind(self) -> int:
+        """The input that is furthest behind: the next to be read."""
+        there = [i for i, inflow in enumerate(self.inflows) if not inflow.ended]
+        return min(there, key=lambda i: self.inflows[i].last_tau)
+
+
+def begin_merging(roles: Sequence[str]) -> Merging:
+    """Begin to merge inputs of the given roles.
+
+    ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or ``heading``, a
+    series that is only cleaned.
+    """
+    return Merging(tuple(_Inflow(role) for role in roles))
+
+
+def merge(
+    merging: Merging, source: int, log: Log | None, options: CleanOptions
+) -> tuple[Merging, Chunk]:
+    """Take in the next part of an input and give what can be let go.
+
+    Parameters
+    ----------
+    merging
+        From the call before; not modified.
+    source
+        Number of the input.
+    log
+        The part; None: the input has come to its end.
+    options
+        How far out of order a row may be, and how much too late the times of a sensor are.
+    """
+    inflow = merging.inflows[source]._replace(ended=log is None)
+    sensors = list(merging.sensors)
+    fixes = _supporting(log, inflow.role) if log is not None else None
+    if fixes is not None and log is not None:
+        delay = options.sensor_delay_s
+        numbers = np.array([_number(sensors, name) for name in log.sensors] or [0])
+        delays = np.array([delay.get(name, 0.0) for name in log.sensors] or [0.0])
+        time = fixes.time - delays[fixes.sensor]
+        fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
+    inflow, events = _order(inflow, fixes, options.reorder_s)
+    inflows = [*merging.inflows]
+    inflows[source] = inflow
+    inflows, rows = _release(inflows)
+    after = Merging(tuple(inflows), tuple(sensors))
+    if log is None:
+        return after, Chunk(rows, (), events, (), False)
+    channels = log.channels if inflow.role in _WITH_CHANNELS else ()
+    events = (*log.events, *events)
+    return after, Chunk(rows, channels, events, log.problems, log.depth_positive_down)
+
+
+def _number(sensors: list[str], name: str) -> int:
+    if name not in sensors:
+        sensors.append(name)
+    return sensors.index(name)
+
+
+def _supporting(log: Log, role: str) -> Fixes | None:
+    """The fixes of a log; a depth series becomes observations of the height alone."""
+    if role != "depth":
+        return log.fixes
+    series = [c for c in log.channels if c.name == "depth_m"]
+    if not series:
+        return None
+    time = np.concatenate([c.time for c in series])
+    n = len(time)
+    position = np.full((n, 3), np.nan)
+    position[:, 2] = -np.concatenate([c.value for c in series])
+    empty = np.full((n, 3), np.nan)
+    zero = np.zeros(n, np.int64)
+    return Fixes(
+        time, position, empty, empty, empty, zero, zero, np.ones(n, bool), np.arange(n), False
+    )
+
+
+def _order(
+    inflow: _Inflow, new: Fixes | None, reorder_s: float
+) -> tuple[_Inflow, tuple[Event, ...]]:
+    """Repair the clock of new rows and move those that are let go to the ready ones."""
+    parts = [part for part in (inflow.held, new) if part is not None]
+    fresh = new.time if new is not None else np.empty(0)
+    inflow, place = _place(inflow, new)
+    row = new.row if new is not None else np.empty(0, np.int64)
+    repaired, clock, events = repair(
+        fresh, place, row, inflow.clock, final=inflow.ended, window=reorder_s
+    )
+    inflow = inflow._replace(clock=clock)
+    if parts:
+        both = join_fixes(parts)
+        inflow = inflow._replace(held=take_fixes(both, repaired.held))
+        if len(repaired.order):
+            auxiliary = np.full(len(repaired.order), inflow.role != "fixes")
+            ordered = take_fixes(both, repaired.order)
+            rows = Rows(ordered, repaired.tau, repaired.time, repaired.late, auxiliary)
+            latest = float(np.nanmax(repaired.tau, initial=-np.inf))
+            inflow = inflow._replace(
+                ready=(*inflow.ready, rows), last_tau=max(inflow.last_tau, latest)
+            )
+    return inflow, events
+
+
+def _place(inflow: _Inflow, fixes: Fixes | None) -> tuple[_Inflow, FloatArray]:
+    """(n, 2) rough local metres, good enough to tell a vessel under way from one at rest."""
+    if fixes is None:
+        return inflow, np.empty((0, 2))
+    if not fixes.geographic:
+        return inflow, fixes.position[:, :2]
+    latitude, longitude = fixes.position[:, 0], fixes.position[:, 1]
+    if np.isnan(inflow.longitude) and np.isfinite(longitude).any():
+        inflow = inflow._replace(longitude=float(longitude[np.isfinite(longitude)][0]))
+    east = wrap(longitude - inflow.longitude) * np.cos(np.radians(latitude))
+    return inflow, np.column_stack([east, latitude]) * METRES_PER_DEGREE
+
+
+def _release(inflows: list[_Inflow]) -> tuple[list[_Inflow], Rows | None]:
+    """Merge the ready rows that no input can still precede."""
+    until = min((inflow.last_tau for inflow in inflows if not inflow.ended), default=np.inf)
+    out: list[Rows] = []
+    keys: list[FloatArray] = []
+    after: list[_Inflow] = []
+    for inflow in inflows:
+        if not inflow.ready:
+            after.append(inflow)
+            continue
+        rows = join_rows(list(inflow.ready))
+        key = _carried(rows.tau)
+        stay = (key >= until) & (len(inflows) > 1) & (until < np.inf)
+        after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
+        out.append(take_rows(rows, ~stay))
+        keys.append(key[~stay])
+    if not sum(len(rows.tau) for rows in out):
+        return after, None
+    together = join_rows(out)
+    if len(out) > 1:
+        together = take_rows(together, np.argsort(np.concatenate(keys), kind="stable"))
+    return after, together
+
+
+def _carried(tau: FloatArray) -> FloatArray:
+    """``tau`` with rows that have no time taking that of the row before them."""
+    known = np.isfinite(tau)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(tau)), -1))
+    filled = np.where(last >= 0, tau[last], -np.inf)
+    return np.maximum.accumulate(filled) if len(tau) else filled

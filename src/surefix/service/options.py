@@ -1,0 +1,207 @@
+"""What the live service reads, writes and keeps, from a TOML file.
+
+::
+
+    [clean]                           # as for `surefix clean`; the mode is real time
+    settle_rows = 120                 # rows that are waited for before noise is settled
+    reorder_s = 2.0
+
+    [[input]]
+    name = "gnss"
+    from = "udp://0.0.0.0:10110"      # see surefix.service.addresses
+    allow = ["192.168.1.0/24"]
+
+    [[output]]
+    to = "tcp-listen://127.0.0.1:10111"
+    sentences = ["GGA", "RMC", "VTG", "GST"]
+    talker = "GP"
+
+    [journal]
+    url = "sqlite:///mission.db"
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from surefix.errors import OptionsError
+from surefix.io.options_file import read_options
+from surefix.io.toml_file import read_toml
+from surefix.pipelines.options import CleanOptions, options_from
+from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
+
+__all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
+
+SENTENCES: Final = ("GGA", "RMC", "VTG", "GST", "HDT", "DPT")
+"""What can be put out."""
+
+_ROLES: Final = ("fixes", "depth", "heading")
+_TALKER: Final = re.compile(r"[A-Z]{2}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputOptions:
+    """One input.
+
+    Parameters
+    ----------
+    name
+        What its sensors are called after.
+    address
+        Where it is read from.
+    role
+        ``fixes``, ``depth`` (supports the fixes), or ``heading`` (only cleaned).
+    allow
+        Networks that datagrams and clients may come from; empty: any.
+    require_checksum
+        False accepts sentences without one.
+    """
+
+    name: str
+    address: Address
+    role: str = "fixes"
+    allow: tuple[str, ...] = ()
+    require_checksum: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise OptionsError(f"input name {self.name!r}", "a name")
+        if self.role not in _ROLES:
+            raise OptionsError(f"role {self.role!r} of {self.name}", "one of " + ", ".join(_ROLES))
+        for network in self.allow:
+            try:
+                ipaddress.ip_network(network, strict=False)
+            except ValueError as error:
+                raise OptionsError(f"allow {network!r} of {self.name}", "a network") from error
+        if not isinstance(self.require_checksum, bool):
+            raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """One output.
+
+    Parameters
+    ----------
+    address
+        Where it goes to.
+    sentences
+        Some of ``SENTENCES``.
+    talker
+        Two letters that the sentences begin with.
+    """
+
+    address: Address
+    sentences: tuple[str, ...] = ("GGA", "RMC", "VTG", "GST")
+    talker: str = "GP"
+
+    def __post_init__(self) -> None:
+        for name in self.sentences:
+            if name not in SENTENCES:
+                raise OptionsError(f"sentence {name!r}", "one of " + ", ".join(SENTENCES))
+        if not isinstance(self.talker, str) or not _TALKER.fullmatch(self.talker):
+            raise OptionsError(f"talker {self.talker!r}", "two capital letters")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveOptions:
+    """What the live service does.
+
+    Parameters
+    ----------
+    clean
+        How the track is estimated.
+    inputs, outputs
+        At least one input.
+    journal
+        URL of the journal.
+    snapshot_s
+        Time between two snapshots, s.
+    """
+
+    clean: CleanOptions
+    inputs: tuple[InputOptions, ...]
+    outputs: tuple[OutputOptions, ...] = ()
+    journal: str = "sqlite:///surefix.db"
+    snapshot_s: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not any(each.role == "fixes" for each in self.inputs):
+            raise OptionsError("no input of fixes", "[[input]] with name and from")
+        names = [each.name for each in self.inputs]
+        if len(set(names)) < len(names):
+            raise OptionsError(f"inputs {', '.join(names)}", "names that differ")
+        if not isinstance(self.snapshot_s, int | float) or not self.snapshot_s > 0.0:
+            raise OptionsError(f"snapshot_s = {self.snapshot_s!r}", "seconds above 0")
+
+
+def read_live(path: str | Path) -> LiveOptions:
+    """Read the options of the live service.
+
+    Raises
+    ------
+    InputError, ParseError
+        The file cannot be read, or is not TOML.
+    OptionsError
+        A key is not known, or a value is wrong.
+    """
+    place = Path(path)
+    content = read_toml(place)
+    given = read_options(place).clean
+    if "settle_rows" not in given:
+        raise OptionsError(
+            f"{place}: [clean] without settle_rows",
+            "how many rows are waited for before the first position",
+            "add settle_rows = 120",
+        )
+    if given.setdefault("mode", "realtime") != "realtime":
+        raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
+    journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    return LiveOptions(
+        clean=options_from(given),
+        inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
+        outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
+        **{("journal" if key == "url" else key): value for key, value in journal.items()},
+    )
+
+
+def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> dict[str, Any]:
+    table = content.get(name, {})
+    if not isinstance(table, dict) or set(table) - keys:
+        raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
+    return table
+
+
+def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:
+    tables = content.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise OptionsError(f"{place}: {name}", f"tables [[{name}]]")
+    return tables
+
+
+def _input(place: Path, table: dict[str, Any]) -> InputOptions:
+    rest = _known(place, "input", table, {"name", "from", "role", "allow", "require_checksum"})
+    if "name" not in rest or "from" not in rest:
+        raise OptionsError(f"{place}: an input without name or from", "both")
+    where = address(str(rest.pop("from")), INPUTS)
+    if where.kind == "file":
+        where = where._replace(path=str(place.parent / where.path))
+    return InputOptions(address=where, **rest)
+
+
+def _output(place: Path, table: dict[str, Any]) -> OutputOptions:
+    rest = _known(place, "output", table, {"to", "sentences", "talker"})
+    if "to" not in rest:
+        raise OptionsError(f"{place}: an output without to", "an address")
+    return OutputOptions(address=address(str(rest.pop("to")), OUTPUTS), **rest)
+
+
+def _known(place: Path, name: str, table: dict[str, Any], keys: set[str]) -> dict[str, Any]:
+    unknown = sorted(set(table) - keys)
+    if unknown:
+        raise OptionsError(f"{place}: {unknown[0]!r} in [[{name}]]", "one of " + ", ".join(keys))
+    return {key: tuple(v) if isinstance(v, list) else v for key, v in table.items()}

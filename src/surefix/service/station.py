@@ -1,0 +1,202 @@
+"""What is known from all that was received: a value, and the two questions that are asked of it.
+
+`receive` takes the next bytes: what is in order by now is cleaned for good. `latest` ends the
+session on trial: it tells what the newest observations say, those included that still wait for late
+ones to be put before them. Both go through the very steps of `surefix clean`.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from surefix.io.journal import Received
+from surefix.io.nmea_log import NmeaStream
+from surefix.pipelines.session import advance, begin_session, end_on_trial
+from surefix.pipelines.snapshot import restored, snapshot
+from surefix.pipelines.state import Session
+from surefix.service.options import LiveOptions
+from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
+
+__all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
+
+
+@dataclass(frozen=True)
+class Station:
+    """What is known.
+
+    Parameters
+    ----------
+    session
+        Of the cleaning.
+    streams
+        The inputs, as far as they are read; never changed in place.
+    after
+        Number of the last bytes taken.
+    observed
+        s, Unix, of the last fix that was used for good; NaN before.
+    """
+
+    session: Session
+    streams: tuple[NmeaStream, ...]
+    after: int = 0
+    observed: float = math.nan
+
+
+class Latest(NamedTuple):
+    """Where the vehicle is.
+
+    Parameters
+    ----------
+    time
+        s, Unix, of validity.
+    position, velocity, sigma_position, sigma_velocity
+        (3,) as in `Track`.
+    geodetic
+        (3,) latitude and longitude, deg, and height, m; None for a metric log.
+    observed
+        s, Unix, of the last fix that was used at least in part.
+    """
+
+    time: float
+    position: FloatArray
+    velocity: FloatArray
+    sigma_position: FloatArray
+    sigma_velocity: FloatArray
+    geodetic: FloatArray | None
+    observed: float
+
+
+def begin_station(options: LiveOptions) -> Station:
+    """Begin with nothing received."""
+    inputs = [(each.name, each.role) for each in options.inputs]
+    streams = tuple(NmeaStream(Path(each.name), each.require_checksum) for each in options.inputs)
+    return Station(begin_session(inputs, options.clean), streams)
+
+
+class _Stored(NamedTuple):
+    """A station that is stored."""
+
+    session: Session
+    streams: tuple[Mapping[str, object], ...]
+    after: int
+    observed: float
+
+
+def stored(station: Station) -> bytes:
+    """Everything that is known, to be stored."""
+    states = tuple(stream.state for stream in station.streams)
+    return snapshot(_Stored(station.session, states, station.after, station.observed))
+
+
+def resumed(options: LiveOptions, content: bytes) -> Station:
+    """Stand where a station stood that was stored with the same options.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or of another version.
+    """
+    known = restored(content, _Stored)
+    streams = begin_station(options).streams
+    for stream, state in zip(streams, known.streams, strict=True):
+        stream.resume(state)
+    return Station(known.session, streams, known.after, known.observed)
+
+
+def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
+    """Take the next bytes, in the order of arrival; empty ones end their input.
+
+    Returns
+    -------
+    station, batches
+        What is known now, and what is cleaned for good.
+    """
+    session, streams = station.session, [*station.streams]
+    batches: list[Cleaned] = []
+    fresh: set[int] = set()
+    for piece in received:
+        if session.merging.inflows[piece.source].ended:
+            continue
+        if piece.source not in fresh:
+            streams[piece.source] = copy.deepcopy(streams[piece.source])
+            fresh.add(piece.source)
+        stream = streams[piece.source]
+        log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
+        session, done = advance(session, piece.source, log)
+        batches += done
+        if not piece.data:
+            session, done = advance(session, piece.source, None)
+            batches += done
+    after = received[-1].number if received else station.after
+    observed = _observed(batches, station.observed)
+    return Station(session, tuple(streams), after, observed), tuple(batches)
+
+
+def latest(station: Station, time: float = math.nan) -> Latest | None:
+    """Where the vehicle is by all that was received; None as long as nothing is settled.
+
+    Parameters
+    ----------
+    station
+        What is known.
+    time
+        s, Unix: later than all that was received, the track is carried on to it by dead reckoning.
+        NaN: at the last fix.
+    """
+    if station.session.setup is None:
+        return None
+    logs = [copy.deepcopy(stream).rest() for stream in station.streams]
+    batches = end_on_trial(station.session, [_with(logs[0], time), *logs[1:]])
+    return _last(batches, _observed(batches, station.observed))
+
+
+def _with(log: Log, time: float) -> Log:
+    """Add a fix that says nothing but its time, after all that is known."""
+    if math.isnan(time):
+        return log
+    known = log.fixes
+    if known is not None and len(known.time) and not time > np.nanmax(known.time):
+        return log
+    empty = np.full((1, 3), np.nan)
+    zero = np.zeros(1, np.int64)
+    tick = Fixes(
+        np.array([time]), empty, empty, empty, empty, zero, zero, np.ones(1, np.bool_), zero, True
+    )
+    if known is None:
+        return replace(log, fixes=tick, sensors=log.sensors or ("clock",))
+    joined = [np.concatenate(pair) for pair in zip(known[:-1], tick[:-1], strict=True)]
+    return replace(log, fixes=Fixes._make([*joined, known.geographic]))
+
+
+def _observed(batches: Sequence[Cleaned], before: float) -> float:
+    """Time of the last fix that was used."""
+    for batch in batches:
+        used = np.isin(batch.verdicts.verdict, (Verdict.USED, Verdict.DOWNWEIGHTED))
+        before = float(np.fmax.reduce(batch.track.time[used], initial=before))
+    return before
+
+
+def _last(batches: Sequence[Cleaned], observed: float) -> Latest | None:
+    """The last row of the track that has a position."""
+    for batch in reversed(batches):
+        track = batch.track
+        known = np.flatnonzero(np.isfinite(track.position[:, :2]).all(axis=1))
+        if len(known):
+            k = int(known[-1])
+            return Latest(
+                float(track.time[k]),
+                track.position[k],
+                track.velocity[k],
+                track.sigma_position[k],
+                track.sigma_velocity[k],
+                None if track.geodetic is None else track.geodetic[k],
+                observed,
+            )
+    return None
