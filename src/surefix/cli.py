@@ -30,6 +30,7 @@ from surefix.cli_inputs import (
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
 __all__ = ["app", "clean", "demo", "info", "main", "reproduce"]
@@ -189,7 +190,7 @@ def clean(
     check_report(report)
     files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
-    with over_bytes(files, quiet=as_json) as told:
+    with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
             depth=depth,
@@ -227,7 +228,7 @@ def info(
     from surefix.pipelines.info import describe, info_lines
 
     files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
-    with over_bytes(files, quiet=as_json) as told:
+    with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
             depth=depth,
@@ -252,7 +253,8 @@ def demo(
     typer.echo("Simulating a dive with USBL, DVL and depth, and cleaning it …")
     from surefix.pipelines.demo import demonstrate
 
-    done = demonstrate(folder, seed)
+    with announced():
+        done = demonstrate(folder, seed)
     for line in done.lines:
         typer.echo(f"  {line}")
     for path in done.written:
@@ -280,7 +282,7 @@ def reproduce(
     check_report(report)
     check_place("--json", json_file)
     keep_inputs(log or [], [path for path in (json_file, report) if path is not None])
-    with over_runs(runs) as told:
+    with announced(), over_runs(runs) as told:
         experiment = run(paper, seed=seed, runs=runs, logs=log or (), progress=told)
     tell(experiment, experiment, json_file, report)
 
@@ -289,6 +291,7 @@ app.command()(compare)
 app.command()(locate)
 app.command()(fleet)
 app.command()(live)
+app.command()(warmup)
 
 
 def main() -> None:

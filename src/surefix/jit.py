@@ -6,16 +6,44 @@ machine code on disk. With ``NUMBA_DISABLE_JIT=1`` the same source runs uncompil
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import ParamSpec, TypeVar, cast
 
 import numba
+from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["helper", "kernel"]
+__all__ = ["compilations", "helper", "kernel"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+@contextmanager
+def compilations(tell: Callable[[str], None]) -> Iterator[None]:
+    """Tell the name of each kernel before it is compiled; what comes from disk is not told."""
+    watch = _Watch(tell)
+    event.register("numba:compile", watch)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", watch)
+
+
+class _Watch(event.Listener):  # type: ignore[misc]  # numba has no types
+    """Hears of compilations; those of the parts of a kernel belong to it."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell, self._depth = tell, 0
+
+    def on_start(self, event: event.Event) -> None:
+        self._depth += 1
+        if self._depth == 1:
+            self._tell(str(event.data["dispatcher"].py_func.__name__))
+
+    def on_end(self, event: event.Event) -> None:
+        self._depth -= 1
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:

@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from surefix.filters.hypotheses import POOR_WEIGHT, Prior, no_hypotheses
 from surefix.filters.hypothesis_review import deleted_residuals
@@ -20,6 +19,7 @@ from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.multi_hypothesis_modes import decide_offline
 from surefix.filters.noise import NoiseFigures, Observations, initial_scales, sample_of, variances
 from surefix.filters.records import Epochs, Motion
+from surefix.filters.simplex import descend
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray
 
@@ -228,18 +228,9 @@ def _likeliest(
         )
         return -_evidence(motion, trial, prior, epochs, 1)
 
-    found = minimize(
-        cost,
-        np.zeros(size),
-        method="Nelder-Mead",
-        options={
-            "initial_simplex": np.vstack([np.zeros(size), 0.25 * np.eye(size)]),
-            "xatol": 0.01,
-            "fatol": 0.1,
-            "maxiter": 40 * size,
-        },
-    )
-    return figures(found.x)._replace(cost=float(found.fun))
+    simplex = np.vstack([np.zeros(size), 0.25 * np.eye(size)])
+    found = descend(cost, simplex, near=0.01, level=0.1, most=40 * size)
+    return figures(found.x)._replace(cost=found.value)
 
 
 def _evidence(

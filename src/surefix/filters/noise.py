@@ -7,13 +7,13 @@ anywhere within a wide window otherwise: gross errors cost a constant, whatever 
 
 from __future__ import annotations
 
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.special import ndtri
 
 from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.simplex import descend
 from surefix.filters.track import filter_track, start
 from surefix.robust.loss import loss_named
 from surefix.types import BoolArray, FloatArray, IntArray
@@ -104,7 +104,7 @@ def difference_scale(
     small = float(np.quantile(normalised, share))
     if small == 0.0 and (normalised > 0.0).any():  # coarse digits: most differences are nought
         small = float(np.quantile(normalised[normalised > 0.0], share))
-    return small / float(ndtri(0.5 + 0.5 * share))
+    return small / NormalDist().inv_cdf(0.5 + 0.5 * share)
 
 
 def grain(values: FloatArray) -> float:
@@ -193,13 +193,8 @@ def estimate_noise(
         ]
         best = trials[int(np.argmin([cost(trial) for trial in trials]))]
     simplex = np.vstack([best, best - 0.7 * np.eye(size)])
-    found = minimize(
-        cost,
-        best,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 0.04, "fatol": 0.3, "maxiter": 60 * size},
-    )
-    return figures(found.x)._replace(cost=float(found.fun))
+    found = descend(cost, simplex, near=0.04, level=0.3, most=60 * size)
+    return figures(found.x)._replace(cost=found.value)
 
 
 def _bounded(theta: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from surefix.types import BoolArray, Edit, Fixes, FloatArray, IntArray
 
 __all__ = ["Epochs", "source"]
 
+_COLUMNS, _MARKS = 9, 3  # of a row that is complete
 _OPEN_ROWS = 8  # rows that may still be joined by a sentence that comes late
 _MOTION_AGE = 0.5  # s; a sentence without a time belongs to an epoch received at most so long ago
 _SYSTEMS = frozenset({"GP", "GN", "GL", "GA", "GB", "BD", "GQ", "QZ", "GI"})
@@ -87,7 +88,7 @@ class Epochs:
 
     def __len__(self) -> int:
         """Complete rows."""
-        return len(self._marks[0])
+        return len(self._marks) // _MARKS
 
     def add(self, record: Position, time: float, received: float) -> None:
         """Put a position sentence into its row, or begin one.
@@ -126,7 +127,7 @@ class Epochs:
         """Move all rows not yet taken in time."""
         for row in self._open:
             row.time += seconds
-        times = np.frombuffer(self._columns[0], dtype=np.float64)
+        times = np.frombuffer(self._values, dtype=np.float64)[::_COLUMNS]
         times += seconds
 
     def take(self, last: bool = False) -> Fixes | None:
@@ -135,25 +136,27 @@ class Epochs:
             self._close(self._open.popleft())
         if not len(self):
             return None
-        time, *values = (np.array(column, dtype=np.float64) for column in self._columns)
-        sensor, number, valid = (np.array(column, dtype=np.int64) for column in self._marks)
+        rows = np.array(self._values, dtype=np.float64).reshape(-1, _COLUMNS)
+        time, *values = (np.ascontiguousarray(column) for column in rows.T)
+        marks = np.array(self._marks, dtype=np.int64).reshape(-1, _MARKS)
+        sensor, number, valid = (np.ascontiguousarray(column) for column in marks.T)
         self._clear()
         return _fixes(time, values, sensor, number, valid != 0)
 
     def _clear(self) -> None:
-        self._columns = tuple(array("d") for _ in range(9))
-        self._marks = tuple(array("q") for _ in range(3))
+        self._values, self._marks = array("d"), array("q")  # row after row
 
     def _find(self, name: str, kind: str, second: float, received: float) -> _Row | None:
+        timed = second == second  # not NaN
         for row in reversed(self._open):
             if row.source != name:
                 continue
-            if isnan(second) or isnan(row.second):
+            if timed and row.second == second:
+                if kind not in row.seen:
+                    return row
+            elif not timed or isnan(row.second):
                 old = abs(received - row.received) > _MOTION_AGE
-                fits = isnan(second) and not old and kind not in row.seen
-                return row if fits else None
-            if row.second == second and kind not in row.seen:
-                return row
+                return row if not timed and not old and kind not in row.seen else None
         return None
 
     def _begin(self, name: str, second: float, time: float) -> _Row:
@@ -177,13 +180,8 @@ class Epochs:
         course = radians(row.course)
         moved = (row.speed * sin(course), row.speed * cos(course))
         place = (row.time, row.latitude, row.longitude, height)
-        for column, value in zip(
-            self._columns, (*place, *moved, row.east, row.north, row.up), strict=True
-        ):
-            column.append(value)
-        marks = (self.sources.index(row.source), row.number, valid)
-        for mark, code in zip(self._marks, marks, strict=True):
-            mark.append(code)
+        self._values.extend((*place, *moved, row.east, row.north, row.up))
+        self._marks.extend((self.sources.index(row.source), row.number, valid))
 
 
 def _fixes(

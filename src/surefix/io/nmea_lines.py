@@ -5,11 +5,13 @@ The pieces come in the order of the log, and say the same however its bytes are 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from surefix.io.nmea import parse
 from surefix.io.nmea_decode import TYPES
 from surefix.io.nmea_frame import Frame, Framing, frame
 from surefix.io.nmea_record import (
@@ -19,6 +21,7 @@ from surefix.io.nmea_record import (
     Motion,
     Position,
     Record,
+    Refused,
     Sigma,
     WaterSpeed,
 )
@@ -26,33 +29,33 @@ from surefix.io.nmea_scan import DECLINED, UNKNOWN, Lines, scan
 
 __all__ = ["Plain", "pieces"]
 
+_MOST = 1000  # addresses that are remembered
+_UNKNOWN: dict[bytes, bool] = {}  # whether `parse` does not know an address either
 _Values = list[float]
 
 
 class Plain(NamedTuple):
-    """A plain line.
+    """Plain lines, one after the other.
 
     Parameters
     ----------
-    line
-        Its number, from 1.
-    received
-        Time of reception, s; NaN if the line has none.
-    record
-        What its sentence says; the type alone, if that is not known.
+    records
+        Of each line its number, from 1, its time of reception, s, NaN if it has none, and what its
+        sentence says. Lines of unknown types are left out.
+    unknown
+        How many sentences there are of each unknown type.
     """
 
-    line: int
-    received: float
-    record: Record | str
+    records: list[tuple[int, float, Record]]
+    unknown: dict[str, int]
 
 
-def pieces(state: Framing, data: bytes) -> Iterator[tuple[Framing, list[Plain] | list[Frame]]]:
+def pieces(state: Framing, data: bytes) -> Iterator[tuple[Framing, Plain | list[Frame]]]:
     r"""Lines that the next bytes of a log complete, and each time the state to go on with.
 
-    >>> [(_, found)] = pieces(Framing(), b"$HEHDT,218.53,T*12\r\n")
-    >>> found[0].record
-    Heading(talker='HE', type='HDT', true=218.53, magnetic=nan)
+    >>> (_, found), _ = pieces(Framing(), b"$HEHDT,218.53,T*12\r\n")
+    >>> found.records
+    [(1, nan, Heading(talker='HE', type='HDT', true=218.53, magnetic=nan))]
     """
     if state.skipping:
         yield frame(state, data)
@@ -64,39 +67,59 @@ def pieces(state: Framing, data: bytes) -> Iterator[tuple[Framing, list[Plain] |
     number = state.line
     if whole:
         lines = scan(data[:whole])
+        _decline_known(data, lines)
         edges = np.flatnonzero(np.diff(lines.code == DECLINED)) + 1
         for a, b in zip([0, *edges.tolist()], [*edges.tolist(), len(lines.code)], strict=True):
             if lines.code[a] != DECLINED:
                 yield Framing(line=number + b - a), _plain(data, lines, a, b, number)
                 number += b - a
                 continue
-            some = data[lines.begin[a] : lines.begin[b]]
-            after, frames = frame(Framing(line=number), some)
+            after, frames = frame(Framing(line=number), data[lines.begin[a] : lines.begin[b]])
             number = after.line
             yield after, frames
-    rest = frame(Framing(line=number), data[whole:])
-    yield rest
+    yield frame(Framing(line=number), data[whole:])
 
 
-def _plain(data: bytes, lines: Lines, a: int, b: int, number: int) -> list[Plain]:
-    out = []
-    for k, (code, (begin, end), received, values) in enumerate(
-        zip(
-            lines.code[a:b].tolist(),
-            lines.address[a:b].tolist(),
-            lines.received[a:b].tolist(),
-            lines.values[a:b].tolist(),
-            strict=True,
-        ),
-        number,
+def _decline_known(data: bytes, lines: Lines) -> None:
+    """Leave to `parse` the sentences that it knows and the kernel does not."""
+    rows = np.flatnonzero(lines.code == UNKNOWN)
+    places = lines.address[rows].tolist()
+    sample = {data[begin:end]: k for k, (begin, end) in zip(rows.tolist(), places, strict=True)}
+    known = [address for address, k in sample.items() if not _is_unknown(address, data, lines, k)]
+    if known:
+        again = np.array([data[begin:end] in known for begin, end in places])
+        lines.code[rows[again]] = DECLINED
+
+
+def _is_unknown(address: bytes, data: bytes, lines: Lines, k: int) -> bool:
+    found = _UNKNOWN.get(address)
+    if found is None:
+        said = parse(data[lines.address[k, 0] - 1 : lines.begin[k + 1]])
+        found = isinstance(said, Refused) and said.kind == "unknown-type"
+        if len(_UNKNOWN) < _MOST:
+            _UNKNOWN[address] = found
+    return found
+
+
+def _plain(data: bytes, lines: Lines, a: int, b: int, number: int) -> Plain:
+    rows = np.flatnonzero(lines.code[a:b] >= 0) + a
+    records = []
+    for line, code, (begin, end), received, values in zip(
+        (rows - a + number).tolist(),
+        lines.code[rows].tolist(),
+        lines.address[rows].tolist(),
+        lines.received[rows].tolist(),
+        lines.values[rows].tolist(),
+        strict=True,
     ):
         address = data[begin:end].decode()
-        if code == UNKNOWN:
-            kind: Record | str = address if address[0] == "P" else address[2:]
-            out.append(Plain(k, received, kind))
-        else:
-            out.append(Plain(k, received, _BUILD[code](address[:2], address[2:], values)))
-    return out
+        records.append((line, received, _BUILD[code](address[:2], address[2:], values)))
+    others = lines.address[a:b][lines.code[a:b] == UNKNOWN].tolist()
+    unknown = Counter(data[begin:end].decode() for begin, end in others)
+    kinds: Counter[str] = Counter()
+    for address, count in unknown.items():
+        kinds[address if address[0] == "P" else address[2:]] += count
+    return Plain(records, kinds)
 
 
 def _day(value: float) -> int | None:

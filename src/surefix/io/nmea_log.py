@@ -123,8 +123,11 @@ def read_nmea(
         with path.open("rb") as file:
             while block := file.read(_BLOCK):
                 for state, found in pieces(state, block):
-                    for at in range(0, len(found), step):
-                        reader.add(found[at : at + step])
+                    if isinstance(found, Plain):
+                        reader.count(found.unknown)
+                    some = found.records if isinstance(found, Plain) else found
+                    for at in range(0, len(some), step):
+                        reader.add(some[at : at + step])
                         if reader.size >= chunk_fixes:
                             yield reader.chunk()
                             given += 1
@@ -233,8 +236,13 @@ class NmeaStream:
         self._framing = START
         return self.chunk(last=True)
 
-    def add(self, found: Sequence[Frame | Plain]) -> None:
-        """Read the next frames or plain lines."""
+    def count(self, unknown: Mapping[str, int]) -> None:
+        """Count sentences of unknown types."""
+        for kind, count in unknown.items():
+            self._counts[kind] = self._counts.get(kind, 0) + count
+
+    def add(self, found: Sequence[Frame | tuple[int, float, Record]]) -> None:
+        """Read the next frames, or the records of the next plain lines."""
         for item in found:
             if len(item) == 3:
                 self._line, self._clock.receive, record = item
@@ -263,15 +271,15 @@ class NmeaStream:
             if self._heed(record) is False:
                 self._problem("other-target", line, text)
         elif record.kind == "unknown-type":
-            self._heed(record.text)
+            self.count({record.text: 1})
         else:
             self._problem(record.kind, line, text)
 
-    def _heed(self, record: Record | str) -> bool | None:
-        """Take a record in, or count the type of one that is not known; False: of no target."""
-        kind = record if isinstance(record, str) else record.type
+    def _heed(self, record: Record) -> bool | None:
+        """Take a record in; False: it is of no target."""
+        kind = record.type
         self._counts[kind] = self._counts.get(kind, 0) + 1
-        return None if isinstance(record, str) else self._take[record.__class__](record)
+        return self._take[record.__class__](record)
 
     def chunk(self, last: bool = False) -> Log:
         """Give out what is complete, with ``last`` all there is."""
@@ -429,6 +437,6 @@ class NmeaStream:
         self._instant(record.second, record.day)
 
     def _samples_of(self, record: Record, **values: float) -> None:
-        time = self._clock.now()
+        time, sensor = self._clock.now(), record.talker + record.type
         for name, value in values.items():
-            self._sample(name, record.talker + record.type, time, value)
+            self._sample(name, sensor, time, value)
