@@ -134,7 +134,8 @@ def _print(done: Fleet) -> None:
             for part in (each.given, each.expected and f"expected {each.expected}", each.remedy)
             if part
         )
-        typer.echo(f"  failed: {each.name}: {' '.join(told.split())}")
+        name = "" if each.given.startswith(each.name) else f"{each.name}: "
+        typer.echo(f"  failed: {name}{' '.join(told.split())}")
     _more(done.failed, len(done.failures))
     again = f", {done.kept} of {done.units} units done before" if done.kept else ""
     changed = f", {done.outdated} done anew after a change" if done.outdated else ""

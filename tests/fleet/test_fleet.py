@@ -188,6 +188,17 @@ def test_parts_of_a_data_set_that_shrank_are_removed(tmp_path, monkeypatch):
     assert result(tmp_path / "out").num_rows == tracks(2).num_rows
 
 
+def test_logs_and_a_data_set_in_one_folder_do_not_remove_each_other(logs, tmp_path):
+    data, place = track_set(tmp_path / "set", tracks(2)), tmp_path / "out"
+    clean_fleet([logs], place, FAST)
+    clean_fleet([data], place, FAST)
+    before = stamps(place)
+    assert len(before) == 4
+    assert clean_fleet([logs], place, FAST).kept == 3
+    assert clean_fleet([data], place, FAST).kept == 1
+    assert stamps(place) == before
+
+
 def test_supporting_logs_stand_beside_each(logs, tmp_path):
     for place in "ab":
         time = pd.read_csv(logs / place / "usbl.csv").time

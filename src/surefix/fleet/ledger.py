@@ -40,6 +40,10 @@ class Ledger:
         """Names of the units by their source."""
         return dict(self._notes.execute("SELECT source, name FROM unit WHERE source != ''"))
 
+    def parts(self) -> list[str]:
+        """Names of the units that hold tracks of a data set."""
+        return [name for (name,) in self._notes.execute("SELECT name FROM unit WHERE source = ''")]
+
     def marks(self) -> dict[str, str]:
         """By unit, what it was made of and how."""
         return dict(self._notes.execute("SELECT name, mark FROM unit"))

@@ -72,7 +72,7 @@ def plan_logs(found: Found, folder: Path, options: FleetOptions, known: dict[str
     for log, name in output_names(found.logs, reserved).items():
         output = f"{name}{options.suffix}"
         beside = {role: str(log.parent / file) for role, file in options.beside.items()}
-        if (folder / output).resolve() == log:
+        if (folder / output).resolve() in found.logs:
             raise OptionsError(f"output {folder / output} is also an input", "another folder")
         mark = f"{how}:{_state(log, beside)}"
         plain = dict(options.columns)

@@ -94,7 +94,7 @@ def clean_fleet(
         else:
             planned = plan_units(found, folder, chosen)
         _sweep(folder)
-        outdated = _forget(planned, ledger, folder, all_others=found.root is not None)
+        outdated = _forget(planned, ledger, folder, parts=found.root is not None)
         kept = _work(planned, ledger, chosen.jobs, progress)
         ledger.select([*(name for name, _ in planned.bad), *(task.name for task in planned.tasks)])
         shutil.rmtree(folder / ".arranged", ignore_errors=True)
@@ -116,12 +116,12 @@ def _sweep(folder: Path) -> None:
             draft.unlink()
 
 
-def _forget(planned: Planned, ledger: Ledger, folder: Path, *, all_others: bool) -> int:
+def _forget(planned: Planned, ledger: Ledger, folder: Path, *, parts: bool) -> int:
     """Remove what was done with other inputs or options, and units that are no longer there."""
     marks = ledger.marks()
     due = {task.name: task.mark for task in planned.tasks}
     changed = [name for name, mark in due.items() if name in marks and marks[name] != mark]
-    gone = [name for name in marks if name not in due] if all_others else []
+    gone = [name for name in ledger.parts() if name not in due] if parts else []
     for name in [*changed, *gone]:
         for output in ledger.forget(name):
             (folder / output).unlink(missing_ok=True)
