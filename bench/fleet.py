@@ -142,6 +142,19 @@ def local(folder: Path) -> dict[str, object]:
         }
     )
     found |= rounds({"kept_1_process": lambda: clean_fleet([data], folder / "kept")})
+    alone = [few.slice(k * ROWS, ROWS).drop_columns(["track_id"]) for k in range(TRACKS)]
+
+    def each(**how: object) -> Callable[[], object]:
+        options = surefix.CleanOptions(**how)
+        return lambda: [surefix.clean(rows, options=options) for rows in alone]
+
+    found |= rounds(
+        {
+            "calls_multi_hypothesis": each(),
+            "calls_igg3": each(method="igg3"),
+            "calls_igg3_noise_given": each(method="igg3", sigma_position=0.5, process=0.3),
+        }
+    )
     return {"local": found, "moved_on_one_machine": moved(folder), "snapshot": snapshots()}
 
 
