@@ -7,13 +7,14 @@ INSTALLED := $(VENV)/.installed
 SPARK := $(VENV)/.spark
 CANDIDATES := $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
 KERNELS := build/kernels
+BENCH := .venv-bench
 
 # Spark takes half a gigabyte and is only needed for its tests: it has a lock of its own.
 ONLY_SPARK := pyspark py4j
 COMPILE := --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
   --custom-compile-command 'make lock'
 
-.PHONY: help demo test lint format lock clean
+.PHONY: help demo test lint format lock bench clean
 .DEFAULT_GOAL := help
 
 help:
@@ -21,6 +22,7 @@ help:
 	@echo 'make test    check style, types and layers, and run every test'
 	@echo 'make lint    check style, types and layers only'
 	@echo 'make format  put the code into its style'
+	@echo 'make bench   time surefix beside its peers, and write docs/benchmarks.*'
 	@echo 'make lock    resolve the dependencies anew into requirements.lock'
 	@echo 'make clean   remove what make made'
 
@@ -50,8 +52,20 @@ lock: $(INSTALLED)
 	printf '%s\n' $(ONLY_SPARK) | $(BIN)/uv pip compile $(COMPILE) --upgrade \
 	  --constraint requirements.lock --output-file requirements-spark.lock -
 
+# Peers live in an environment of their own, and one that cannot be installed is left out.
+bench: $(BENCH)/.installed
+	NUMBA_CACHE_DIR=$(KERNELS) $(BENCH)/bin/python bench/run.py
+
+$(BENCH)/.installed: $(INSTALLED) bench/requirements.txt
+	$(BIN)/python -m venv $(BENCH)
+	@$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@grep -v '^#' bench/requirements.txt | while read -r peer; do \
+	  $(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" \
+	    || echo "$$peer cannot be installed: skipped"; done
+	@touch $@
+
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 
 $(INSTALLED): requirements.lock pyproject.toml
 	@found=; for python in $(CANDIDATES); do \

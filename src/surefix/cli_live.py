@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from surefix.service.station import Latest
 
 __all__ = ["live"]
 
@@ -24,8 +27,12 @@ def live(
     from surefix.service.options import read_live
 
     service = begin_live(read_live(options))
-    before = f", after {service.taken:,} pieces in the journal" if service.taken else ""
-    typer.echo(f"{len(service.lines)} inputs, {len(service.options.outputs)} outputs{before}")
+    for line in service.lines:
+        typer.echo(f"from {line.address}")
+    for output in service.options.outputs:
+        typer.echo(f"to {output.address}")
+    if service.taken:
+        typer.echo(f"going on after {service.taken:,} pieces in the journal")
 
     async def serve() -> None:
         stop = asyncio.Event()
@@ -35,4 +42,11 @@ def live(
         await run_live(service, stop)
 
     asyncio.run(serve())
-    typer.echo(f"stopped after {service.taken:,} pieces received and {service.said:,} things told")
+    known = service.now
+    told = "no position yet" if known is None else f"the last position has σ {_sigma(known):.2f} m"
+    typer.echo(f"stopped after {service.taken:,} pieces received; {told}")
+
+
+def _sigma(known: Latest) -> float:
+    """The larger of the horizontal standard deviations, m."""
+    return float(max(known.sigma_position[:2]))

@@ -6,18 +6,33 @@ machine code on disk. With ``NUMBA_DISABLE_JIT=1`` the same source runs uncompil
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["compilations", "helper", "kernel"]
+__all__ = [
+    "compilations",
+    "helper",
+    "inlined",
+    "inner",
+    "kernel",
+    "lean_helper",
+    "lean_kernel",
+    "threaded_kernel",
+]
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+_LEAN: Final[Mapping[str, Any]] = {
+    "_nrt": False,
+    "no_cfunc_wrapper": True,
+    "fastmath": {"contract"},
+}
 
 
 @contextmanager
@@ -42,7 +57,7 @@ class _Watch(event.Listener):  # type: ignore[misc]  # numba has no types
         if self._depth == 1:
             self._tell(str(event.data["dispatcher"].py_func.__name__))
 
-    def on_end(self, event: event.Event) -> None:
+    def on_end(self, event: event.Event) -> None:  # noqa: ARG002
         self._depth -= 1
 
 
@@ -60,3 +75,51 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
     """
     compiled = register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
     return cast(Callable[P, T], compiled(function))
+
+
+def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel that allocates nothing: references to arrays are not counted in it.
+
+    Counting them, an atomic operation for each slice, costs a small kernel more than its work. A
+    product and a sum may become one instruction.
+    """
+    lean = numba.njit(cache=True, error_model="numpy", **_LEAN)
+    return cast(Callable[P, T], lean(function))
+
+
+def lean_helper(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function that allocates nothing and that only kernels call.
+
+    No way in from Python is made, where it stays as it is written.
+    """
+    return register_jitable(error_model="numpy", **_LEAN)(function)
+
+
+def inner(function: Callable[P, T]) -> Callable[P, T]:
+    """Make such a function part of the machine code of the kernels that call it.
+
+    That is for what is called often or from one place: it is compiled at every place anew.
+    """
+    return register_jitable(error_model="numpy", forceinline=True, **_LEAN)(function)
+
+
+def inlined(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function that is made part of the machine code of each kernel that calls it.
+
+    Sizes that the caller knows (see `surefix.rows`) are then known inside, and no array is counted
+    on the way. A product and a sum may become one instruction.
+    """
+    part = register_jitable(
+        error_model="numpy",
+        forceinline=True,
+        fastmath={"contract"},
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )
+    inside: Callable[P, T] = part(function)
+    return inside
+
+
+def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
+    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function))

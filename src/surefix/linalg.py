@@ -9,10 +9,18 @@ from __future__ import annotations
 
 import math
 
-from surefix.jit import helper
+from surefix.jit import helper, inlined
+from surefix.rows import Size, add_row, copy_row, dot_rows, width
 from surefix.types import FloatArray
 
-__all__ = ["absorb", "cholesky", "multiply_transpose", "solve_lower", "triangularize"]
+__all__ = [
+    "absorb",
+    "cholesky",
+    "multiply_transpose",
+    "solve_lower",
+    "triangularize",
+    "triangularize_rows",
+]
 
 
 @helper
@@ -48,6 +56,39 @@ def triangularize(A: FloatArray, rows: int, columns: int) -> None:
                 A[j, k] -= dot * A[i, k]
         A[i, i] = -norm if head > 0.0 else norm
         for k in range(i + 1, columns):
+            A[i, k] = 0.0
+
+
+@inlined
+def triangularize_rows(A: FloatArray, v: FloatArray, size: Size) -> None:
+    """Do the same to a square matrix of a size that the compiler may know, row by row.
+
+    Parameters
+    ----------
+    A
+        (n, n), C-contiguous; overwritten.
+    v
+        (1, n) scratch.
+    size
+        Size n, see `surefix.rows`.
+    """
+    n = width(size)
+    for i in range(n - 1):
+        head = A[i, i]
+        copy_row(v, 0, A, i, size)
+        for k in range(i + 1):
+            v[0, k] = 0.0
+        norm2 = dot_rows(v, 0, v, 0, size)
+        if norm2 == 0.0:
+            continue
+        norm = math.sqrt(head * head + norm2)
+        pivot = head + norm if head > 0.0 else head - norm
+        v[0, i] = pivot
+        beta = 2.0 / (pivot * pivot + norm2)
+        for j in range(i + 1, n):
+            add_row(A, j, -beta * dot_rows(A, j, v, 0, size), v, 0, size)
+        A[i, i] = -norm if head > 0.0 else norm
+        for k in range(i + 1, n):
             A[i, k] = 0.0
 
 

@@ -163,7 +163,7 @@ def test_the_trail_of_the_best_is_its_account(seed):
     said = max(twin[-1].accounts, key=lambda account: account.weight).said
     slot, back = trail.best[-1], []
     for k in range(len(said) - 1, -1, -1):
-        code = trail.code[k, slot]
+        code = trail.code[trail.first[k] + slot]
         back.append("isolated" if code & 1 else word(code))
-        slot = trail.parent[k, slot]
+        slot = trail.parent[trail.first[k] + slot]
     assert tuple(back[::-1]) == said

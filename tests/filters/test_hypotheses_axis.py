@@ -7,7 +7,7 @@ import pytest
 from scipy import integrate, stats
 
 from surefix.filters.hypothesis_axis import commit, forget, open_run, predict_axis, update_axis
-from surefix.filters.hypothesis_branches import log_normal, log_wild, wrapped
+from surefix.filters.hypothesis_density import log_normal, log_wild, wrapped
 from surefix.models.motion import noise_factor, transition
 
 ORDERS = [2, 3]

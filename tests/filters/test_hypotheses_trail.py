@@ -30,12 +30,12 @@ MOTION = world(0, 5, axes=2, blocks=False).motion
 def trail_of(*codes):
     """Trail of one hypothesis in changing places."""
     n = len(codes)
-    parent, code = np.zeros((n, 4), np.int8), np.zeros((n, 4), np.uint16)
-    best = (np.arange(n) % 3).astype(np.int8)
+    parent, code = np.zeros((n, 4), np.uint8), np.zeros((n, 4), np.uint16)
+    best = (np.arange(n) % 3).astype(np.uint8)
     for k in range(n):
         parent[k, best[k]] = best[k - 1] if k else 0
         code[k, best[k]] = codes[k]
-    return Trail(parent, code, best)
+    return Trail(parent.ravel(), code.ravel(), 4 * np.arange(n + 1), best)
 
 
 def every(codes):
@@ -110,7 +110,7 @@ def test_it_follows_until_the_past_is_seen_otherwise():
     assert follow(MOTION, trail, 0, 0, said) == 5
     assert said.fixed[:5, 0].tolist() == [1, 0, 1, 0, 0]
     assert said.run.tolist() == [0, 0, 0, 1, 1, 0, 0]
-    trail.parent[2, trail.best[2]] = 3
+    trail.parent[trail.first[2] + trail.best[2]] = 3
     assert follow(MOTION, trail, 0, 0, said) == 2
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from surefix.filters.learning import learn, supposed
+from surefix.filters.learning import learn, likelihood, supposed
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise
 from surefix.simulate.contamination import alone, draw, draw_world
 
@@ -91,6 +91,55 @@ def test_the_prior_is_what_the_log_shows():
     prior = learnt(trial_of("one-axis", "alone", 4)).prior
     assert prior.partial == pytest.approx(0.2, abs=0.04)
     assert prior.isolated < 0.04
+
+
+def test_a_run_of_wrong_velocities_is_no_livelier_motion():
+    """It passes for one where every velocity is judged by itself, or before anything is learnt."""
+    fooled = []
+    for seed in (0, 1):
+        trial = trial_of("dvl-faults", "aided", seed)
+        seen, world = observed(trial), trial.world
+        known = {"period": 0.0, "longest": 39.5 * world.interval_s}
+        known["speed"] = 20.0 * world.sigma_m / world.interval_s
+        fit = []
+        for n in (2, 3):
+            begun = estimate_noise(seen, UNKNOWN, order=n)
+            found = learn(seen, UNKNOWN, begun, order=n, floor=TINY, **known).figures
+            fit.append(
+                [-begun.cost, *(likelihood(seen, f, order=n, **known) for f in (begun, found))]
+            )
+        steady, lively = fit
+        assert steady[2] - lively[2] > 100.0
+        fooled.append([lively[i] > steady[i] for i in (0, 1)])
+    assert fooled == [[True, False], [False, True]]
+
+
+def test_wrong_velocities_do_not_make_the_motion_calmer():
+    """They are off alike, which tells nothing of how the vehicle moves."""
+    errors = []
+    for seed in range(4):
+        trial = trial_of("dvl-faults", "aided", seed)
+        errors.append(figures_of(trial, learnt(trial).figures)[1])
+    assert abs(np.mean(errors)) < 0.06
+
+
+def test_errors_of_one_axis_are_not_taken_for_errors_of_all():
+    for seed in range(6):
+        prior = learnt(trial_of("one-axis", "alone", seed, epochs=400)).prior
+        assert prior.partial == pytest.approx(0.2, abs=0.05)
+        assert prior.isolated < 0.03
+
+
+def test_rows_of_wrong_fixes_are_counted():
+    """After two that are wrong: certain in a burst, by chance elsewhere."""
+    rows = {
+        name: learnt(trial_of(name, "alone", 1)).prior.row
+        for name in ("burst-independent", "burst-common", "isolated-40", "clean")
+    }
+    assert rows["burst-independent"] > 0.75
+    assert rows["isolated-40"] == pytest.approx(0.4, abs=0.1)
+    assert rows["burst-common"] < 0.5
+    assert rows["clean"] == pytest.approx(0.3, abs=0.05)
 
 
 def test_what_the_user_knows_stays():

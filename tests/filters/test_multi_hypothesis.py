@@ -76,6 +76,8 @@ def test_one_call_is_a_call_per_epoch(order, axes):
     one, steps = zip(*parts, strict=True)
     joined = Found(*(np.concatenate(fields) for fields in zip(*one, strict=True)))
     path = Trail(*(np.concatenate(fields) for fields in zip(*steps, strict=True)))
+    counts = np.concatenate([np.diff(step.first) for step in steps])
+    path = path._replace(first=np.append(0, np.cumsum(counts)))
     for a, b in zip((*found, *trail), (*joined, *path), strict=True):
         np.testing.assert_array_equal(a, b)
     used = whole.number[0]
@@ -151,7 +153,7 @@ def test_it_is_as_sure_as_it_may_be(axes, velocity, irregular):
             seed, 250, axes=axes, q=0.02, velocity=velocity, irregular=irregular, blocks=False
         )
         epochs, bad = spoilt(seed, made)
-        prior = prior_of(made.motion, isolated=0.15, partial=0.01)
+        prior = prior_of(made.motion, isolated=0.15, row=0.15, partial=0.01)
         _, found, _ = run(made.motion, prior, epochs, traced=False)
         ratio = ((found.mean - made.truth) / found.sigma)[20:, :axes] ** 2
         whole, count = whole + ratio.sum(), count + ratio.size

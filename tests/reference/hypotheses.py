@@ -25,6 +25,7 @@ POOR = 4.0  # variances of a poor observation
 GROSS = 36.0
 STRANGE = 16.0
 CONFIRMED = 3
+ROW = 2  # wrong fixes on end after which the next is likely to be wrong
 PREFERS = 3.0
 ALIKE = 0.7
 PATIENCE, AIDED = 1.25, 5.0
@@ -238,7 +239,10 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         return _use(base, z, variance, time, step, some, period, known, **how)
 
     over = {"run": -1, "open": (None,) * d}
-    out = [told(used(account, []), wild(axes) + np.log(prior.isolated), "isolated")]
+    wrong = prior.row if not running and account.lost[axes[0]][1] >= ROW else prior.isolated
+    out = [told(used(account, []), wild(axes) + np.log(wrong), "isolated")]
+    right = np.log(1.0 - wrong) - np.log(1.0 - prior.isolated)
+    account = account._replace(weight=account.weight + right)
     if own:
         ended = used(account._replace(**over), axes)
         out.append(told(ended, belongs + np.log(prior.ending), "drop"))

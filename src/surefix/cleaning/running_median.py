@@ -1,10 +1,11 @@
-"""The running median in O(log n) a sample: a window that keeps its order as samples come and go.
+"""The running median: of whole series, and of a window that keeps its order as samples come and go.
 
-The samples of the window are split into two heaps in one flat array: the lower half, largest on
-top, grows from the front, and the upper half, smallest on top, from the back. Every slot of the
-window knows its place in its heap, so the oldest sample leaves as fast as a new one enters, and the
-median is read off the tops. Paper 004, section 2.2, keeps a doubly linked list in order instead,
-which costs O(n) a sample; the medians are the same.
+Whole series go by `surefix.cleaning.window_medians`. A `SortedWindow` is for samples that come one
+by one: O(log n) each. Its samples are split into two heaps in one flat array: the lower half,
+largest on top, grows from the front, and the upper half, smallest on top, from the back. Every slot
+of the window knows its place in its heap, so the oldest sample leaves as fast as a new one enters,
+and the median is read off the tops. Paper 004, section 2.2, keeps a doubly linked list in order
+instead, which costs O(n) a sample; the medians are the same.
 
 NaN is missing: it takes its turn in the window and has no say in the median. Infinities are values
 like any other. An even number of samples has the mean of its two middle ones.
@@ -22,8 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surefix.cleaning.window_medians import NARROW, narrow_medians, wide_medians
 from surefix.errors import OptionsError
-from surefix.jit import helper, kernel
+from surefix.jit import helper
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["SortedWindow", "middle", "push", "running_median", "sorted_window"]
@@ -99,22 +101,17 @@ def running_median(values: ArrayLike, window: int, *, centred: bool = True) -> F
     OptionsError
         The window has no samples.
     """
+    if window < 1:
+        raise OptionsError(f"window {window}", "a whole number from 1")
     given = np.asarray(values, dtype=np.float64)
-    columns = np.ascontiguousarray(np.atleast_2d(given.T))
     ahead = (window - 1) // 2 if centred else 0
-    medians = np.empty_like(columns)
-    for column, median in zip(columns, medians, strict=True):
-        _slide(column, ahead, sorted_window(window), median)
-    return np.ascontiguousarray(medians.T).reshape(given.shape)
-
-
-@kernel
-def _slide(values: FloatArray, ahead: int, window: SortedWindow, medians: FloatArray) -> None:
-    n = len(values)
-    for k in range(n + ahead):
-        push(window, values[k] if k < n else np.nan)
-        if k >= ahead:
-            medians[k - ahead] = middle(window)
+    columns = np.atleast_2d(given.T)
+    beyond = np.full((len(columns), window - 1), np.nan)
+    before = window - 1 - ahead
+    samples = np.hstack((beyond[:, :before], columns, beyond[:, before:]))
+    medians_of = narrow_medians if window <= NARROW else wide_medians
+    medians = [medians_of(column, window) for column in samples]
+    return np.ascontiguousarray(np.transpose(medians)).reshape(given.shape)
 
 
 @helper

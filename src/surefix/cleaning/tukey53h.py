@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.cleaning.replacement import RECENT, Replaced, continued, edited
+from surefix.cleaning.window_medians import narrow_medians
 from surefix.errors import OptionsError
-from surefix.jit import helper, kernel
 from surefix.types import FloatArray
 
 __all__ = ["DELAY", "Ends", "State53H", "push", "tukey53h"]
@@ -223,40 +223,9 @@ def _reversed_end(x: FloatArray) -> FloatArray:
     return _x3(turned)[::-1]
 
 
-@kernel
 def _x3(x: FloatArray) -> FloatArray:
     """Give x₃ of the samples that have four neighbours on both sides, (n − 8,)."""
-    n = len(x)
-    if n < _REACH:
+    if len(x) < _REACH:
         return np.empty(0)
-    x1, x2, x3 = np.empty(n - 4), np.empty(n - 6), np.empty(n - 8)
-    scratch = np.empty(5)
-    for i in range(n - 4):
-        x1[i] = _median(x, i, 5, scratch)
-    for i in range(n - 6):
-        x2[i] = _median(x1, i, 3, scratch)
-    for i in range(n - 8):
-        x3[i] = 0.25 * x2[i] + 0.5 * x2[i + 1] + 0.25 * x2[i + 2]
-    return x3
-
-
-@helper
-def _median(x: FloatArray, start: int, size: int, scratch: FloatArray) -> float:
-    """Median of the known ones of ``size`` samples; NaN where none is."""
-    count = 0
-    for i in range(start, start + size):
-        value = x[i]
-        if np.isnan(value):
-            continue
-        place = count
-        while place > 0 and scratch[place - 1] > value:
-            scratch[place] = scratch[place - 1]
-            place -= 1
-        scratch[place] = value
-        count += 1
-    if count == 0:
-        return np.nan
-    half = count // 2
-    if count % 2 == 1:
-        return float(scratch[half])
-    return float(0.5 * (scratch[half - 1] + scratch[half]))
+    x2 = narrow_medians(narrow_medians(x, 5), 3)
+    return 0.25 * x2[:-2] + 0.5 * x2[1:-1] + 0.25 * x2[2:]

@@ -87,6 +87,8 @@ class Prior(NamedTuple):
     adapt
         (`MOST_SENSORS`,) how fast the noise of the positions of each sensor follows what is
         observed: 1 over the number of observations remembered, 0 for not at all.
+    row
+        Probability that a fix is wrong by itself if the two before it were.
     """
 
     isolated: float
@@ -101,6 +103,7 @@ class Prior(NamedTuple):
     spread: FloatArray
     sigma_velocity: float
     adapt: FloatArray = np.zeros(MOST_SENSORS)
+    row: float = 0.3
 
 
 class Bank(NamedTuple):
@@ -167,10 +170,22 @@ class Bank(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """Where hypotheses came from: (n, k) previous place and code of each, and (n,) the best."""
+    """Where the hypotheses came from that there were after each of n epochs.
+
+    Parameters
+    ----------
+    parent, code
+        Of each hypothesis its place an epoch before, below 256, and what it says; those of one
+        epoch side by side.
+    first
+        (n + 1,) where those of each epoch begin, and where the last ones end.
+    best
+        (n,) place of the likeliest.
+    """
 
     parent: IntArray
     code: IntArray
+    first: IntArray
     best: IntArray
 
 

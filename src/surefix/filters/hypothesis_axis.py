@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from surefix.jit import helper
+from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray
 
 __all__ = [
@@ -29,7 +29,7 @@ HASTE = 2.0
 _SWIFT = 30.0  # standard deviations
 
 
-@helper
+@inner
 def predict_axis(m: FloatArray, P: FloatArray, order: int, dt: float, q: float) -> None:
     """Advance one axis by ``dt`` seconds under white noise of density q; b stays.
 
@@ -69,7 +69,7 @@ def predict_axis(m: FloatArray, P: FloatArray, order: int, dt: float, q: float) 
     P[2, 0] = P[0, 2]
 
 
-@helper
+@inner
 def update_axis(
     m: FloatArray, P: FloatArray, n: int, c: int, shifted: bool, nu: float, r: float
 ) -> None:
@@ -102,44 +102,32 @@ def update_axis(
         S += g3 if n > 3 else g2
     if not S > 0.0:
         return
-    k0, k1, k2 = g0 / S, g1 / S, g2 / S
+    inverse = 1.0 / S
+    k0, k1, k2 = g0 * inverse, g1 * inverse, g2 * inverse
     m[0] += k0 * nu
     m[1] += k1 * nu
     m[2] += k2 * nu
-    P[0, 0] -= k0 * g0
-    P[0, 1] -= k0 * g1
-    P[1, 1] -= k1 * g1
-    P[0, 2] -= k0 * g2
-    P[1, 2] -= k1 * g2
-    P[2, 2] -= k2 * g2
+    # What was observed is known to its last digit: no difference of large numbers.
+    left = r * inverse
+    place, rate = not shifted and c == 0, not shifted and c != 0
+    P[0, 0] = max(g0 * left if place else P[0, 0] - k0 * g0, 0.0)
+    P[1, 1] = max(g1 * left if rate else P[1, 1] - k1 * g1, 0.0)
+    P[2, 2] = max(P[2, 2] - k2 * g2, 0.0)
+    P[0, 1] = g1 * left if place else g0 * left if rate else P[0, 1] - k0 * g1
+    P[0, 2] = g2 * left if place else P[0, 2] - k0 * g2
+    P[1, 2] = g2 * left if rate else P[1, 2] - k1 * g2
+    P[1, 0], P[2, 0], P[2, 1] = P[0, 1], P[0, 2], P[1, 2]
     if n > 3:
-        k3 = g3 / S
+        k3 = g3 * inverse
         m[3] += k3 * nu
-        P[0, 3] -= k0 * g3
-        P[1, 3] -= k1 * g3
+        P[0, 3] = g3 * left if place else P[0, 3] - k0 * g3
+        P[1, 3] = g3 * left if rate else P[1, 3] - k1 * g3
         P[2, 3] -= k2 * g3
-        P[3, 3] -= k3 * g3
-    if not shifted:  # what was observed is known to its last digit: no difference of large numbers
-        left = r / S
-        if c == 0:
-            P[0, 0] = g0 * left
-            P[0, 1] = g1 * left
-            P[0, 2] = g2 * left
-            if n > 3:
-                P[0, 3] = g3 * left
-        else:
-            P[0, 1] = g0 * left
-            P[1, 1] = g1 * left
-            P[1, 2] = g2 * left
-            if n > 3:
-                P[1, 3] = g3 * left
-    for i in range(n):
-        P[i, i] = max(P[i, i], 0.0)
-        for j in range(i):
-            P[i, j] = P[j, i]
+        P[3, 3] = max(P[3, 3] - k3 * g3, 0.0)
+        P[3, 0], P[3, 1], P[3, 2] = P[0, 3], P[1, 3], P[2, 3]
 
 
-@helper
+@lean_helper
 def reach(order: int, c: int, gap: float) -> float:
     """How far component c is moved in ``gap`` seconds by a unit of the highest rate."""
     if c == order - 1:
@@ -147,13 +135,13 @@ def reach(order: int, c: int, gap: float) -> float:
     return gap if c == order - 2 else 0.5 * gap * gap
 
 
-@helper
+@lean_helper
 def agility(q: float, gap: float) -> float:
     """Scale of a change of the highest rate: a gross error of what is usual in ``gap`` seconds."""
     return _SWIFT * math.sqrt(q * gap)
 
 
-@helper
+@lean_helper
 def change_rate(P: FloatArray, order: int, gap: float, sigma: float) -> None:
     """Let the highest rate have changed at once by 0 ± ``sigma``, ``gap`` seconds ago."""
     for i in range(order):
@@ -161,7 +149,7 @@ def change_rate(P: FloatArray, order: int, gap: float, sigma: float) -> None:
             P[i, j] += reach(order, i, gap) * reach(order, j, gap) * sigma * sigma
 
 
-@helper
+@lean_helper
 def begin_anew(m: FloatArray, P: FloatArray, n: int, speed: float) -> None:
     """Forget how fast the vehicle goes: its rates are 0 ± ``speed``, and where it is stays."""
     for i in range(n):
@@ -174,7 +162,7 @@ def begin_anew(m: FloatArray, P: FloatArray, n: int, speed: float) -> None:
             m[i] = 0.0
 
 
-@helper
+@lean_helper
 def open_run(m: FloatArray, P: FloatArray, n: int, nu: float, r: float) -> None:
     """Begin a run: nothing was known of b, so it is the innovation and the track is not changed."""
     b = n - 1
@@ -185,7 +173,7 @@ def open_run(m: FloatArray, P: FloatArray, n: int, nu: float, r: float) -> None:
     P[b, b] = P[0, 0] + r
 
 
-@helper
+@lean_helper
 def forget(m: FloatArray, P: FloatArray, n: int) -> None:
     """End a run: b is dropped."""
     b = n - 1
@@ -195,7 +183,7 @@ def forget(m: FloatArray, P: FloatArray, n: int) -> None:
         P[j, b] = 0.0
 
 
-@helper
+@lean_helper
 def commit(m: FloatArray, P: FloatArray, n: int) -> None:
     """Take the offset for a true jump: ``p += b``."""
     b = n - 1

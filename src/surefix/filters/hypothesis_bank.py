@@ -31,39 +31,87 @@ from surefix.filters.hypothesis_axis import (
     reach,
     update_axis,
 )
-from surefix.filters.hypothesis_branches import log_sum, wrapped
+from surefix.filters.hypothesis_density import log_sum, wrapped
 from surefix.filters.records import Motion
-from surefix.jit import helper
+from surefix.jit import inner, lean_helper
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["apply_position", "best_of", "copy_hypothesis", "keep_best", "merge", "report"]
+__all__ = ["apply_position", "best_of", "give_rows", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
+_NOUGHT = -37.0  # nats: what is less likely than the best by that adds nothing to a sum
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
 
-@helper
-def copy_hypothesis(to: Bank, i: int, source: Bank, k: int, d: int, n: int) -> None:
-    """Copy hypothesis k of one bank to place i of another; the weight is left."""
+@inner
+def _copy(bank: Bank, to: int, k: int, d: int, n: int) -> None:
+    """Copy what row k of the bank holds to another row; the weight is left."""
     for a in range(d):
         for j in range(n):
-            to.mean[i, a, j] = source.mean[k, a, j]
+            bank.mean[to, a, j] = bank.mean[k, a, j]
             for l in range(n):
-                to.covariance[i, a, j, l] = source.covariance[k, a, j, l]
-        to.seen[i, a] = source.seen[k, a]
-        to.slip[i, a] = source.slip[k, a]
-        to.lost[i, a] = source.lost[k, a]
-        to.missed[i, a] = source.missed[k, a]
-        to.touched[i, a] = source.touched[k, a]
-    to.began[i] = source.began[k]
-    to.run[i] = source.run[k]
-    to.opened[i] = source.opened[k]
-    to.length[i] = source.length[k]
-    to.faulty[i] = source.faulty[k]
-    to.moved[i] = source.moved[k]
+                bank.covariance[to, a, j, l] = bank.covariance[k, a, j, l]
+        bank.seen[to, a] = bank.seen[k, a]
+        bank.slip[to, a] = bank.slip[k, a]
+        bank.lost[to, a] = bank.lost[k, a]
+        bank.missed[to, a] = bank.missed[k, a]
+        bank.touched[to, a] = bank.touched[k, a]
+    bank.began[to] = bank.began[k]
+    bank.run[to] = bank.run[k]
+    bank.opened[to] = bank.opened[k]
+    bank.length[to] = bank.length[k]
+    bank.faulty[to] = bank.faulty[k]
+    bank.moved[to] = bank.moved[k]
 
 
-@helper
+@inner
+def give_rows(
+    bank: Bank,
+    place: IntArray,
+    parent: IntArray,
+    chosen: IntArray,
+    count: int,
+    claims: IntArray,
+    spare: IntArray,
+    row: IntArray,
+) -> None:
+    """Give each chosen candidate a row: that of its parent, or a copy while others come from it.
+
+    Parameters
+    ----------
+    place
+        (k,) rows of the hypotheses, the free ones last; overwritten.
+    parent, chosen, count
+        Parents of the candidates, and which of these are chosen.
+    claims, spare, row
+        (k,) scratch.
+    """
+    d, n = bank.mean.shape[1], bank.mean.shape[2]
+    before, free = bank.number[0], 0
+    for i in range(before):
+        claims[i] = 0
+    for i in range(count):
+        claims[parent[chosen[i]]] += 1
+    for i in range(len(place)):
+        if i >= before or claims[i] == 0:
+            spare[free] = place[i]
+            free += 1
+    for i in range(count):
+        p = parent[chosen[i]]
+        row[i] = place[p]
+        claims[p] -= 1
+        if claims[p] > 0:
+            free -= 1
+            row[i] = spare[free]
+            _copy(bank, row[i], place[p], d, n)
+    for i in range(count):
+        place[i] = row[i]
+    for i in range(free):
+        place[count + i] = spare[i]
+    bank.number[0] = count
+
+
+@inner
 def best_of(weight: FloatArray, count: int) -> int:
     """Place of the greatest of the first ``count`` weights."""
     best = 0
@@ -73,7 +121,7 @@ def best_of(weight: FloatArray, count: int) -> int:
     return best
 
 
-@helper
+@inner
 def keep_best(
     score: FloatArray, total: int, chosen: IntArray, weight: FloatArray
 ) -> tuple[int, float]:
@@ -88,31 +136,37 @@ def keep_best(
     top = -np.inf
     for i in range(total):
         top = max(top, score[i])
-    norm = 0.0
-    for i in range(total):
-        norm += math.exp(score[i] - top)
-    norm = top + math.log(norm)
+    norm = kept = 0.0
+    crowded = False
     count = 0
     for i in range(total):
-        if score[i] < top - _FAR:
+        gap = score[i] - top
+        part = math.exp(gap) if gap > _NOUGHT else 0.0
+        norm += part
+        if gap < -_FAR:
             continue
+        kept += part
         j = min(count, most - 1)
-        if count == most and score[i] <= score[chosen[most - 1]]:
-            continue
+        if count == most:
+            crowded = True
+            if score[i] <= score[chosen[most - 1]]:
+                continue
         while j > 0 and score[chosen[j - 1]] < score[i]:
             chosen[j] = chosen[j - 1]
             j -= 1
         chosen[j] = i
         count = min(count + 1, most)
-    kept = 0.0
+    if crowded:
+        kept = 0.0
+        for i in range(count):
+            kept += math.exp(score[chosen[i]] - top)
+    kept = top + math.log(kept)
     for i in range(count):
-        kept += math.exp(score[chosen[i]] - top)
-    for i in range(count):
-        weight[i] = score[chosen[i]] - top - math.log(kept)
-    return count, norm
+        weight[i] = score[chosen[i]] - kept
+    return count, top + math.log(norm)
 
 
-@helper
+@inner
 def apply_position(
     motion: Motion,
     bank: Bank,
@@ -183,97 +237,112 @@ def apply_position(
             rate = abs(nu) / reach(motion.order, 0, gap)
             rate = max(agility(motion.density[a], gap), HASTE * rate)
             change_rate(P, motion.order, gap, rate)
-        if code & POOR:
-            update_axis(m, P, n, 0, False, nu, variance[a] / POOR_WEIGHT)
-        elif code & OPEN:
+        if code & OPEN:
             open_run(m, P, n, nu, variance[a])
-        elif code & CONTINUE:
+            continue
+        shifted = code & CONTINUE != 0
+        if shifted:
             nu = wrapped(nu - m[b], motion.period)
-            update_axis(m, P, n, 0, True, nu, variance[a])
-        else:
-            update_axis(m, P, n, 0, False, nu, variance[a])
+        r = variance[a] / POOR_WEIGHT if code & POOR else variance[a]
+        update_axis(m, P, n, 0, shifted, nu, r)
 
 
-@helper
-def merge(motion: Motion, bank: Bank, count: int, keep: BoolArray) -> None:
-    """Let the lesser of two hypotheses that say the same add its weight to the greater."""
-    b = motion.order
+@inner
+def merge(motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: FloatArray) -> None:
+    """Let the lesser of two hypotheses that say the same add its weight to the greater.
+
+    ``keep`` (k,) becomes which are left; ``key`` (k,) is scratch.
+    """
+    count = bank.number[0]
     for i in range(count):
         keep[i] = True
-    for i in range(count):
-        if not keep[i]:
+        key[i] = bank.mean[place[i], 0, 0]
+    for first in range(count):
+        if not keep[first]:
             continue
-        for j in range(i + 1, count):
-            if not keep[j] or bank.run[i] != bank.run[j]:
+        limit = _ALIKE * bank.covariance[place[first], 0, 0, 0]
+        limit = limit if limit > 0.0 else np.inf
+        for second in range(first + 1, count):
+            gap = key[first] - key[second]
+            if gap * gap > limit or not keep[second]:
                 continue
-            if bank.run[i] >= 0 and bank.opened[i] != bank.opened[j]:
-                continue
-            alike = bank.faulty[i] == bank.faulty[j]
-            distance = 0.0
-            for a in range(motion.axes):
-                if bank.seen[i, a] != bank.seen[j, a]:
-                    alike = False
-                    break
-                if bank.run[i] >= 0:
-                    gap = bank.mean[i, a, b] - bank.mean[j, a, b]
-                    P = bank.covariance[i, a, b, b]
-                    distance += gap * gap / P if P > 0.0 else 0.0
-                for s in range(2):
-                    gap = bank.mean[i, a, s] - bank.mean[j, a, s]
-                    P = bank.covariance[i, a, s, s]
-                    distance += gap * gap / P if P > 0.0 else 0.0
-                    ratio = bank.covariance[j, a, s, s] / P if P > 0.0 else 1.0
-                    if ratio > 1.05 or ratio < 0.95:
-                        alike = False
-                if not alike or distance > _ALIKE:
-                    alike = False
-                    break
-            if alike:
-                keep[j] = False
-                bank.weight[i] = log_sum(bank.weight[i], bank.weight[j])
+            if _alike(motion, bank, place[first], place[second]):
+                keep[second] = False
+                bank.weight[first] = log_sum(bank.weight[first], bank.weight[second])
 
 
-@helper
-def report(motion: Motion, bank: Bank, said: IntArray, best: int, k: int, found: Found) -> None:
+@lean_helper
+def _alike(motion: Motion, bank: Bank, i: int, j: int) -> bool:
+    """Whether rows i and j of the bank say the same of the present and of the runs."""
+    if bank.run[i] != bank.run[j] or bank.faulty[i] != bank.faulty[j]:
+        return False
+    running = bank.run[i] >= 0
+    if running and bank.opened[i] != bank.opened[j]:
+        return False
+    b = motion.order
+    distance = 0.0
+    for a in range(motion.axes):
+        if bank.seen[i, a] != bank.seen[j, a]:
+            return False
+        for s in range(2):
+            gap = bank.mean[i, a, s] - bank.mean[j, a, s]
+            P = bank.covariance[i, a, s, s]
+            if P > 0.0:
+                other = bank.covariance[j, a, s, s]
+                if other > 1.05 * P or other < 0.95 * P:
+                    return False
+                distance += gap * gap / P
+        if running:
+            gap = bank.mean[i, a, b] - bank.mean[j, a, b]
+            P = bank.covariance[i, a, b, b]
+            distance += gap * gap / P if P > 0.0 else 0.0
+        if distance > _ALIKE:
+            return False
+    return True
+
+
+@inner
+def report(
+    motion: Motion,
+    bank: Bank,
+    place: IntArray,
+    share: FloatArray,
+    said: IntArray,
+    best: int,
+    k: int,
+    found: Found,
+) -> None:
     """Mean and standard deviations of the mixture over the hypotheses that know the axis.
 
     A manoeuvre that just began counts from the next observation on, unless it is the likeliest: a
-    wild fix would leave the mixture no mean, however improbable it makes that account.
+    wild fix would leave the mixture no mean, however improbable it makes that account. ``share``
+    (k,) are the probabilities of the hypotheses; those that do not count become 0.
     """
     d, order = motion.axes, motion.order
+    for i in range(bank.number[0]):
+        if i != best and said[i] & MANOEUVRE:
+            share[i] = 0.0
     for a in range(d):
-        mass = 0.0
-        for i in range(bank.number[0]):
-            if bank.seen[i, a] and (i == best or not said[i] & MANOEUVRE):
-                mass += math.exp(bank.weight[i])
         for s in range(order):
-            c = s * d + a
-            if not mass > 0.0 and s == 0:
-                found.mean[k, c] = np.nan
-                found.sigma[k, c] = np.nan
-                continue
-            reference = 0.0
-            first = True
-            total = 0.0
-            square = 0.0
-            within = 0.0
-            whole = 0.0
+            reference = total = square = within = whole = 0.0
             for i in range(bank.number[0]):
-                if s == 0 and not bank.seen[i, a]:
+                row, w = place[i], share[i]
+                if w == 0.0 or (s == 0 and not bank.seen[row, a]):
                     continue
-                if i != best and said[i] & MANOEUVRE:
-                    continue
-                if first:
-                    reference = bank.mean[i, a, s]
-                    first = False
-                w = math.exp(bank.weight[i])
-                gap = bank.mean[i, a, s] - reference
+                if whole == 0.0:
+                    reference = bank.mean[row, a, s]
+                gap = bank.mean[row, a, s] - reference
                 if s == 0:
                     gap = wrapped(gap, motion.period)
                 whole += w
                 total += w * gap
                 square += w * gap * gap
-                within += w * bank.covariance[i, a, s, s]
+                within += w * bank.covariance[row, a, s, s]
+            c = s * d + a
+            if not whole > 0.0:
+                found.mean[k, c] = np.nan
+                found.sigma[k, c] = np.nan
+                continue
             total /= whole
             found.mean[k, c] = reference + total
             found.sigma[k, c] = math.sqrt(max(within / whole + square / whole - total * total, 0.0))

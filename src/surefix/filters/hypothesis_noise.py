@@ -8,10 +8,10 @@ import numpy as np
 
 from surefix.filters.hypotheses import Bank, Found, Prior
 from surefix.filters.hypothesis_bank import best_of
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.records import Motion
-from surefix.jit import helper
-from surefix.types import FloatArray
+from surefix.jit import inner, lean_helper
+from surefix.types import FloatArray, IntArray
 
 __all__ = ["adapt", "innovate"]
 
@@ -24,10 +24,11 @@ _MEAN_SQUARE = (
 _QUIET, _LOUD = 0.01, 100.0  # factors of a variance within which it is adapted
 
 
-@helper
+@inner
 def innovate(
     motion: Motion,
     bank: Bank,
+    place: IntArray,
     k: int,
     z: FloatArray,
     r: FloatArray,
@@ -39,7 +40,7 @@ def innovate(
     ``share`` becomes what part of the variance of each axis is that of the position observed.
     """
     d = motion.axes
-    best = best_of(bank.weight, bank.number[0])
+    best = place[best_of(bank.weight, bank.number[0])]
     for a in range(d):
         out.weight[k, a] = np.nan if math.isnan(z[a]) else 0.0
         out.weight[k, d + a] = np.nan if math.isnan(z[d + a]) else 0.0
@@ -53,7 +54,7 @@ def innovate(
         out.standardised[k, d + a] = nu / math.sqrt(S)
 
 
-@helper
+@lean_helper
 def adapt(
     motion: Motion,
     prior: Prior,

@@ -12,10 +12,11 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import POOR, POOR_WEIGHT, Prior
-from surefix.filters.hypothesis_branches import log_normal, log_wild
+from surefix.filters.hypothesis_branches import GROSS, ROW
+from surefix.filters.hypothesis_density import log_normal, log_wild
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rts import Smoothed
-from surefix.jit import helper, kernel
+from surefix.jit import inner, kernel
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["deleted", "deleted_residuals", "review"]
@@ -97,11 +98,38 @@ def review(
     """
     residual, variance = deleted_residuals(motion, epochs, fixed, smoothed)
     out = fixed.copy()
-    _review(motion.axes, prior, residual, variance, epochs.variance, locked, out)
+    d = motion.axes
+    far = np.nansum(residual[:, :d] ** 2 / variance[:, :d], axis=1) > GROSS
+    row = _rows_of_wrong(d, prior, epochs.z, (fixed == 0.0) & (far & ~locked[:, 0])[:, None])
+    _review(d, prior, residual, variance, epochs.variance, locked, row, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-@helper
+def _rows_of_wrong(axes: int, prior: Prior, z: FloatArray, out: BoolArray) -> FloatArray:
+    """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it.
+
+    Of these only gross errors count, ``out`` (n, m): a sensor that wanders would confirm itself.
+    Those of a run with a common offset are another matter.
+    """
+    odds: FloatArray = np.zeros(len(z))
+    rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
+    lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
+    wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
+    wrong[ROW:-ROW] = out[rows, lead]
+    more = math.log(prior.row / prior.isolated)
+    less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
+    n = len(rows)
+    for ahead in range(ROW + 1):  # what being wrong says of oneself, of the next, …
+        row = np.arange(n) < n - ahead
+        for j in range(ahead - ROW, ahead):
+            row &= wrong[ROW + j : ROW + j + n] | (j == 0)
+        also = wrong[ROW + ahead : ROW + ahead + n] | (ahead == 0)
+        gain = np.where(also, more, less) - (less if ahead == 0 else 0.0)
+        odds[rows] += np.where(row, gain, 0.0)
+    return odds
+
+
+@inner
 def _patterns(
     axes: int,
     prior: Prior,
@@ -110,6 +138,7 @@ def _patterns(
     wild: FloatArray,
     wide: FloatArray,
     seen: int,
+    row: float,
 ) -> int:
     """Axes that are wrong under the likeliest account of one fix, as a code of the filter."""
     belongs = 0.0
@@ -126,7 +155,7 @@ def _patterns(
     chosen = 0
     if poor + math.log(prior.poor) > best:
         best, chosen = poor + math.log(prior.poor), POOR
-    score = math.log(prior.isolated) + log_wild(square, scale, seen)
+    score = math.log(prior.isolated) + row + log_wild(square, scale, seen)
     if score > best:
         best, chosen = score, mask
     if seen > 1:
@@ -153,6 +182,7 @@ def _review(
     variance: FloatArray,
     noise: FloatArray,
     locked: BoolArray,
+    row: FloatArray,
     out: FloatArray,
 ) -> None:
     inside = np.empty(axes)
@@ -191,7 +221,7 @@ def _review(
                 for a in range(axes):
                     out[k, axes + a] = w if max(good, fair) >= outside else 0.0
                 continue
-            mask = _patterns(axes, prior, inside, poor, wild, wide, seen)
+            mask = _patterns(axes, prior, inside, poor, wild, wide, seen, row[k])
             for a in range(axes):
                 w = POOR_WEIGHT if mask & POOR else 1.0
                 out[k, a] = 0.0 if (mask >> a) & 1 else w

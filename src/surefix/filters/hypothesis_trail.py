@@ -20,7 +20,7 @@ from surefix.filters.hypotheses import (
     Trail,
 )
 from surefix.filters.records import Motion
-from surefix.jit import helper, kernel
+from surefix.jit import inner, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["Decisions", "decide", "follow", "runs", "undecided"]
@@ -51,7 +51,7 @@ def undecided(motion: Motion, n: int) -> Decisions:
     return Decisions(np.ones((n, 2 * motion.axes)), np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
-@helper
+@inner
 def _used(code: int, axis: int, running: bool) -> float:
     """Weight of an axis of the position."""
     if running or (code >> axis) & 1:
@@ -59,7 +59,7 @@ def _used(code: int, axis: int, running: bool) -> float:
     return POOR_WEIGHT if code & POOR else 1.0
 
 
-@helper
+@inner
 def _moved(code: int) -> float:
     """Weight of the velocity."""
     if code & VELOCITY_OUT:
@@ -67,14 +67,14 @@ def _moved(code: int) -> float:
     return POOR_WEIGHT if code & VELOCITY_POOR else 1.0
 
 
-@helper
+@inner
 def _write(decisions: Decisions, k: int, code: int, axes: int, running: bool) -> None:
     for a in range(axes):
         decisions.fixed[k, a] = _used(code, a, running)
         decisions.fixed[k, axes + a] = _moved(code)
 
 
-@helper
+@inner
 def _untold(decisions: Decisions, first: int, every: int) -> bool:
     """Whether the run that reaches back beyond ``first`` was told as a run, not as a jump."""
     for k in range(first - 1, -1, -1):
@@ -85,7 +85,7 @@ def _untold(decisions: Decisions, first: int, every: int) -> bool:
     return True
 
 
-@helper
+@inner
 def _touched(motion: Motion, seen: BoolArray, code: int, a: int) -> bool:
     """Whether anything of an axis was used at an epoch, be it in a run."""
     placed = seen[a] and not (code >> a) & 1
@@ -122,7 +122,7 @@ def decide(
     anew = np.full(motion.axes, -1)  # the fix of a restart …
     lost = np.full(motion.axes, -1)  # … and the earliest one left out before it
     for k in range(head, first - 1, -1):
-        code = trail.code[k, slot]
+        code = trail.code[trail.first[k] + slot]
         for a in range(motion.axes):
             if turned[a] >= 0 and _touched(motion, seen[k], code, a):
                 decisions.jump[turned[a]] |= 1 << motion.axes + a
@@ -161,7 +161,7 @@ def decide(
                 turned[a] = k
             if code & (RESTART << a):
                 anew[a] = lost[a] = k
-        slot = trail.parent[k, slot]
+        slot = trail.parent[trail.first[k] + slot]
     for a in range(motion.axes):
         if turned[a] >= 0:
             decisions.jump[turned[a]] |= 1 << motion.axes + a
@@ -187,8 +187,8 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
     n = len(trail.best)
     for k in range(head, n):
         best = trail.best[k]
-        code = trail.code[k, best]
-        if k > 0 and (trail.parent[k, best] != slot or code & (COMMIT | MANOEUVRE | RESTARTS)):
+        code, parent = trail.code[trail.first[k] + best], trail.parent[trail.first[k] + best]
+        if k > 0 and (parent != slot or code & (COMMIT | MANOEUVRE | RESTARTS)):
             return k
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)

@@ -23,10 +23,10 @@ from surefix.filters.simplex import descend
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray
 
-__all__ = ["Learnt", "learn", "supposed"]
+__all__ = ["Learnt", "learn", "likelihood", "supposed"]
 
 _ROUNDS = 3
-_ENOUGH = 0.02  # relative change of the figures that ends the rounds
+_ENOUGH = 0.02  # relative change of the figures, and change of the shares, that ends the rounds
 _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
 _LEAST_WILD = 5.0  # … and at least
 _SHARES = {
@@ -34,7 +34,9 @@ _SHARES = {
     "partial": (0.2, 50.0),
     "poor": (0.5, 50.0),
     "manoeuvre": (0.02, 100.0),
+    "row": (1.0, 3.0),
 }  # prior counts: wrong, and all
+_EVEN = 0.5  # most that a row is believed to go on: else what wanders would confirm itself
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
 _FEWEST = 0.1  # share of good triples of neighbours that tell the scale of differences …
@@ -133,12 +135,41 @@ def learn(
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        supposed_before, before = prior, figures
         prior = _counted(prior, said, residual, math.sqrt(float(np.median(epochs.variance))))
-        before = figures
         figures = _likeliest(sample, said, prior, given, before, least, motion)
-        if _change(before, figures) < _ENOUGH:
+        if _change(before, figures) < _ENOUGH and _moved(supposed_before, prior) < _ENOUGH:
             break
     return Learnt(figures, prior)
+
+
+def likelihood(
+    observations: Observations,
+    figures: NoiseFigures,
+    *,
+    order: int,
+    period: float,
+    speed: float,
+    longest: float,
+) -> float:
+    """Log-likelihood of a log before anything is learnt, by which motion models are told apart.
+
+    A run of wrong velocities is explained by a livelier model, unless it may be a run.
+
+    Parameters
+    ----------
+    observations, order, period, speed, longest
+        As for `learn`.
+    figures
+        Those to begin with.
+    """
+    sample = sample_of(observations)
+    axes = sample.z.shape[1] // 2
+    if len(sample.time) < 3 or not np.isfinite(figures.position).any():
+        return -figures.cost
+    prior = supposed(axes, *_usual(figures), speed, longest)._replace(isolated=_MANY)
+    motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
+    return _evidence(motion, figures, prior, epochs, _BRIEFLY)
 
 
 def _motion(figures: NoiseFigures, axes: int, order: int, period: float) -> Motion:
@@ -176,9 +207,13 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
     turns = (said.jump >> axes > 0).sum()
     total = seen.any(axis=1).sum()
 
-    def share(name: str, count: int) -> float:
+    placed = seen.any(axis=1)
+    alone = whole[placed] & (said.run[placed] == 0)
+    after = alone[:-2] & alone[1:-1]
+
+    def share(name: str, count: int, among: int | None = None) -> float:
         wrong, everything = _SHARES[name]
-        return float((count + wrong) / (total + everything))
+        return float((count + wrong) / ((total if among is None else among) + everything))
 
     spread = prior.spread.copy()
     if out.sum() >= _FEW:
@@ -189,6 +224,7 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
         partial=share("partial", some.sum()),
         poor=share("poor", poor.sum()),
         manoeuvre=share("manoeuvre", turns),
+        row=min(share("row", (after & alone[2:]).sum(), after.sum()), _EVEN),
         spread=spread,
     )
 
@@ -212,6 +248,7 @@ def _likeliest(
         return first
 
     weight = np.where(said.fixed > 0.0, said.fixed, 1.0)
+    used = sample._replace(z=np.where(said.fixed > 0.0, sample.z, np.nan))
 
     def figures(theta: FloatArray) -> NoiseFigures:
         factor: FloatArray = np.exp(np.clip(theta, -_WIDEST, _WIDEST))
@@ -222,7 +259,7 @@ def _likeliest(
 
     def cost(theta: FloatArray) -> float:
         trial = figures(theta)
-        epochs = _epochs(sample, trial)
+        epochs = _epochs(used, trial)
         epochs = epochs._replace(
             variance=epochs.variance / weight, fixed=said.fixed, jump=said.jump
         )
@@ -279,3 +316,8 @@ def _change(before: NoiseFigures, after: NoiseFigures) -> float:
     pairs = [*zip(before.position, after.position, strict=True)]
     pairs += [*zip(before.velocity, after.velocity, strict=True), (before.process, after.process)]
     return max(abs(math.log(b / a)) for a, b in pairs if a > 0.0 and b > 0.0)
+
+
+def _moved(before: Prior, after: Prior) -> float:
+    """Largest change of the shares of fixes that are wrong, on all axes or on some."""
+    return max(abs(after.isolated - before.isolated), abs(after.partial - before.partial))

@@ -1,27 +1,60 @@
-"""The steps of `surefix.filters.kalman` over a whole series of a linear model with a fixed step.
+"""The Kalman filter of any linear model over whole series: one, or many at once, or step by step.
 
-For models that `surefix.filters.track` does not know: any F, Q and H, correlated observations.
+For models that `surefix.filters.track` does not know: any F, Q and H, which may change from epoch
+to epoch, and correlated observations. The state is carried as a covariance, and by Joseph's form
+where digits would be lost (`surefix.filters.linear_step`): of the 16 digits those remain by which
+the variances of the states do not differ. Beyond 10¹² take the steps in square-root form of
+`surefix.filters.kalman`, which keep half of the rest.
+
+A constant velocity seen with noise, in a series and as a stream:
+
+>>> F, Q = [[1.0, 1.0], [0.0, 1.0]], [[0.003, 0.005], [0.005, 0.01]]
+>>> from surefix.filters.kalman import gaussian
+>>> begin, z = gaussian([0.0, 0.0], np.diag([1.0, 4.0])), np.array([[1.2], [np.nan], [2.9]])
+>>> filter_linear(begin, z, F, Q, [[1.0, 0.0]], [[0.25]]).mean.round(3).tolist()
+[[1.143, 0.915], [2.058, 0.915], [2.904, 0.885]]
+>>> model, state = stream_model(F, Q, [[1.0, 0.0]], [[0.25]]), stacked(begin)
+>>> for row in z:
+...     state, seen = advance(model, state, row)
+>>> state[0].round(3).tolist()
+[2.904, 0.885]
 """
 
 from __future__ import annotations
 
+import itertools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
-from surefix.filters.kalman import Gaussian, Innovation, Spread, _factor, _update
-from surefix.jit import kernel
-from surefix.linalg import triangularize
+from surefix.filters.kalman import Gaussian, Spread
+from surefix.filters.linear_step import LinearModel, run, step
 from surefix.robust.loss import Loss, loss_named
-from surefix.types import FloatArray, IntArray
+from surefix.rows import Size, size_of
+from surefix.types import FloatArray
 
-__all__ = ["LinearTrack", "filter_linear"]
+__all__ = [
+    "LinearTrack",
+    "StreamModel",
+    "advance",
+    "filter_linear",
+    "linear_model",
+    "stacked",
+    "stream_model",
+]
+
+_SLICES = 4  # pieces of work a core, so that none waits for another
+_ALIKE = 1e-9  # relative difference of what is called symmetric
+_EXTREME = 1e-9  # of the largest variance: how far below 0 rounding may bring an eigenvalue
 
 
 class LinearTrack(NamedTuple):
-    """What the filter found at each of N epochs.
+    """What the filter found at each of N epochs; of T series all fields are (T, N, …).
 
     Parameters
     ----------
@@ -42,6 +75,14 @@ class LinearTrack(NamedTuple):
     weight: FloatArray
 
 
+class StreamModel(NamedTuple):
+    """A linear model and its loss, packed for `advance`."""
+
+    packed: FloatArray
+    states: Size
+    components: Size
+
+
 def filter_linear(
     x: Gaussian,
     z: ArrayLike,
@@ -55,18 +96,17 @@ def filter_linear(
     """Predict and update at every epoch, weighing each component by itself.
 
     The same as calling `surefix.filters.kalman.predict` and `surefix.filters.kalman.update` in
-    turn, at the speed of compiled code.
+    turn, at the speed of compiled code. Many series of one model run on all cores.
 
     Parameters
     ----------
     x
-        State of size n one step before the first epoch.
+        State of size n one step before the first epoch; of T series (n,) and (n, n) for all, or
+        (T, n) and (T, n, n).
     z
-        (N, m) observations; NaN is missing.
-    F, Q, H
-        (n, n), (n, n) and (m, n).
-    R
-        (m, m), or (N, m, m) for one each epoch.
+        (N, m) observations, or (T, N, m) for T series; what is not finite is missing.
+    F, Q, H, R
+        (n, n), (n, n), (m, n) and (m, m), or a leading N for one each epoch: F and Q lead to it.
     loss, spread
         As for `surefix.filters.kalman.update`.
 
@@ -75,68 +115,152 @@ def filter_linear(
     OptionsError
         Q or R is no covariance, the shapes do not agree, or the loss is Student-t.
     """
-    seen = np.array(z, dtype=np.float64)
-    n = len(x.mean)
-    if seen.ndim != 2:
-        raise OptionsError(f"z of shape {seen.shape}", "(N, m)")
-    N, m = seen.shape
+    seen = np.ascontiguousarray(z, dtype=np.float64)
+    if seen.ndim not in {2, 3}:
+        raise OptionsError(f"z of shape {seen.shape}", "(N, m), or (T, N, m) for T series")
+    *series, N, m = seen.shape
+    n = x.mean.shape[-1]
+    if spread not in get_args(Spread):
+        raise OptionsError(f"spread {spread!r}", "one of " + ", ".join(get_args(Spread)))
+    if x.mean.shape not in {(n,), (*series, n)} or x.factor.shape != (*x.mean.shape, n):
+        raise OptionsError(
+            f"a state of shapes {x.mean.shape} and {x.factor.shape}",
+            f"({n},) and ({n}, {n}), with a leading {tuple(series)} or not",
+        )
+    model, by_noise = linear_model(F, Q, H, R, (n, m, N)), spread == "noise"
+    T = series[0] if series else 1
+    out = (
+        np.empty((T, N, n)),
+        np.empty((T, N * n, n)),
+        *(np.empty((T, N, m)) for _ in range(3)),
+    )
+    arrays = (
+        np.ascontiguousarray(np.broadcast_to(x.mean, (*series, n)), np.float64).reshape(T, 1, n),
+        np.ascontiguousarray(np.broadcast_to(x.covariance, (*series, n, n))).reshape(T, n, n),
+        seen.reshape(T, N, m),
+        *out,
+    )
+    usable = _usable(loss)
+    _on_all_cores(T, lambda some: run(model, usable, by_noise, *(each[some] for each in arrays)))
+    mean, covariance, *found = (each.reshape(*series, -1, *each.shape[2:]) for each in out)
+    return LinearTrack(mean, covariance.reshape(*mean.shape, n), *found)
+
+
+def _on_all_cores(count: int, work: Callable[[slice], None]) -> None:
+    """Do ``count`` pieces of work in slices, on as many threads as there are cores."""
+    cores = min(os.cpu_count() or 1, count)
+    if cores < 2:
+        work(slice(0, count))
+        return
+    ends = np.linspace(0, count, min(_SLICES * cores, count) + 1).astype(np.int64)
+    with ThreadPoolExecutor(cores) as pool:
+        list(pool.map(work, (slice(a, b) for a, b in itertools.pairwise(ends.tolist()))))
+
+
+def stream_model(
+    F: ArrayLike, Q: ArrayLike, H: ArrayLike, R: ArrayLike, loss: Loss | None = None
+) -> StreamModel:
+    """Check a linear model of constant matrices and pack it for `advance`.
+
+    Parameters
+    ----------
+    F, Q, H, R, loss
+        As for `filter_linear`.
+
+    Raises
+    ------
+    OptionsError
+        As `filter_linear`.
+    """
+    m, n = np.shape(H) if np.ndim(H) == 2 else (0, 0)
+    model, loss = linear_model(F, Q, H, R, (n, m, 1)), _usable(loss)
+    parts = [np.ravel(each) for each in model[:6]]
+    return StreamModel(
+        np.concatenate([*parts, [loss.code, loss.k0, loss.k1]]), model.states, model.components
+    )
+
+
+def stacked(x: Gaussian) -> FloatArray:
+    """Mean (n,) on top of covariance (n, n), as `advance` takes and gives them: (n + 1, n)."""
+    return np.concatenate((x.mean[None], x.covariance))
+
+
+def advance(model: StreamModel, state: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Predict and update once, for streams; the same numbers as `filter_linear` to the last bit.
+
+    Parameters
+    ----------
+    model
+        From `stream_model`.
+    state
+        (n + 1, n) the mean on top of the covariance, from `stacked` or the epoch before.
+    z
+        (m,) float64 observation; NaN is missing.
+
+    Returns
+    -------
+    state, seen
+        (n + 1, n), and (3, m): residuals, squared innovations over their variance, weights.
+    """
+    packed, states, components = model
+    after, seen = np.empty(state.shape), np.empty((3, len(z)))
+    step(packed, states, components, state, z, after, seen)
+    return after, seen
+
+
+def _usable(loss: Loss | None) -> Loss:
     loss = loss or loss_named("kalman")
     if loss.code == 6:
         raise OptionsError("loss 'student-t'", "a loss of the innovation", "use huber or igg3")
-    if spread not in get_args(Spread):
-        raise OptionsError(f"spread {spread!r}", "one of " + ", ".join(get_args(Spread)))
-    rows, step = (np.array(A, dtype=np.float64) for A in (H, F))
-    if rows.shape != (m, n) or step.shape != (n, n):
-        raise OptionsError(f"H {rows.shape}, F {step.shape}", f"({m}, {n}) and ({n}, {n})")
-    noise = np.asarray(R, dtype=np.float64)
-    if noise.shape not in {(m, m), (N, m, m)}:
-        raise OptionsError(f"R of shape {noise.shape}", f"({m}, {m}) or ({N}, {m}, {m})")
-    _check(noise)
-    mean, factor = np.empty((N, n)), np.empty((N, n, n))
-    found = Innovation(*(np.full((N, m), np.nan) for _ in Innovation._fields))
-    start = Gaussian(x.mean.copy(), np.ascontiguousarray(x.factor, dtype=np.float64).copy())
-    every = np.ascontiguousarray(np.broadcast_to(noise, (N, m, m)))
-    G = np.ascontiguousarray(_factor(Q, n, "Q"))
-    group = np.arange(m, dtype=np.int64)
-    _run(start, seen, step, G, rows, every, group, loss, spread == "noise", mean, factor, found)
-    covariance = factor @ np.swapaxes(factor, 1, 2)
-    return LinearTrack(mean, covariance, found.residual, found.nis, found.weight)
+    return loss
 
 
-def _check(R: FloatArray) -> None:
-    """Refuse noise that is not finite, symmetric and positive definite at every epoch."""
-    known = bool(np.isfinite(R).all())
-    alike = known and np.allclose(R, np.swapaxes(R, -1, -2), rtol=1e-9, atol=0.0)
-    if not alike or np.linalg.eigvalsh(R).min(initial=1.0) <= 0.0:
-        raise OptionsError("R", "finite, symmetric, positive definite covariances")
+def linear_model(
+    F: ArrayLike, Q: ArrayLike, H: ArrayLike, R: ArrayLike, sizes: tuple[int, int, int]
+) -> LinearModel:
+    """Check the matrices of a linear model and lay them out for the kernels.
+
+    Parameters
+    ----------
+    F, Q, H, R
+        As for `filter_linear`.
+    sizes
+        Numbers of states n, of components m, and of epochs N.
+
+    Raises
+    ------
+    OptionsError
+        Q or R is no covariance, or a shape does not agree.
+    """
+    n, m, N = sizes
+    shapes = {"F": (n, n), "Q": (n, n), "H": (m, n), "R": (m, m)}
+    stacks = []
+    for given, (name, shape) in zip((F, Q, H, R), shapes.items(), strict=True):
+        matrix = np.asarray(given, dtype=np.float64)
+        if matrix.shape not in {shape, (N, *shape)}:
+            raise OptionsError(f"{name} of shape {matrix.shape}", f"{shape} or {(N, *shape)}")
+        stacks.append(np.ascontiguousarray(matrix.reshape(-1, *shape)))
+    step_, noise, seen, error = stacks
+    _check(noise, "Q", _EXTREME)
+    _check(error, "R", 0.0)
+    wanted = (step_, np.swapaxes(step_, 1, 2), noise, seen, np.swapaxes(seen, 1, 2), error)
+    f, f_t, q, h, h_t, r = (
+        np.ascontiguousarray(each).reshape(-1, each.shape[2]) for each in wanted
+    )
+    return LinearModel(f, f_t, q, h, h_t, r, size_of(n), size_of(m))
 
 
-@kernel
-def _run(
-    x: Gaussian,
-    z: FloatArray,
-    F: FloatArray,
-    G: FloatArray,
-    H: FloatArray,
-    R: FloatArray,
-    group: IntArray,
-    loss: Loss,
-    by_noise: bool,
-    mean: FloatArray,
-    factor: FloatArray,
-    found: Innovation,
-) -> None:
-    """Advance ``x`` in place through the series and note what every epoch gave."""
-    n = F.shape[0]
-    A = np.empty((n, 2 * n))
-    for k in range(z.shape[0]):
-        A[:, :n] = F @ x.factor
-        A[:, n:] = G
-        triangularize(A, n, 2 * n)
-        x.factor[:, :] = A[:, :n]
-        x.mean[:] = F @ x.mean
-        found.residual[k] = z[k] - H @ x.mean
-        row = Innovation(found.residual[k], found.nis[k], found.sigma[k], found.weight[k])
-        _update(x, row, H, R[k], group, loss, by_noise)
-        mean[k] = x.mean
-        factor[k] = x.factor
+def _check(stack: FloatArray, name: str, tolerance: float) -> None:
+    """Refuse what is not finite, symmetric and positive (semi-)definite."""
+    turned = np.swapaxes(stack, -1, -2)
+    if np.isfinite(stack).all() and (np.abs(stack - turned) <= _ALIKE * np.abs(turned)).all():
+        size = stack.shape[-1]
+        largest = np.abs(np.einsum("kii->ki", stack)).max(axis=1, initial=0.0)
+        slack = tolerance * np.where(largest > 0.0, largest, 1.0)
+        try:
+            np.linalg.cholesky(stack + slack[:, None, None] * np.eye(size))
+            return
+        except np.linalg.LinAlgError:
+            pass
+    semi = "semi-" if tolerance else ""
+    raise OptionsError(name, f"finite, symmetric, positive {semi}definite covariances")

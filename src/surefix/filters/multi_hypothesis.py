@@ -42,27 +42,29 @@ from surefix.filters.hypothesis_axis import (
 from surefix.filters.hypothesis_bank import (
     apply_position,
     best_of,
-    copy_hypothesis,
+    give_rows,
     keep_best,
     merge,
     report,
 )
 from surefix.filters.hypothesis_branches import (
-    BRANCHES,
     CONFIRMED,
     position_branches,
     velocity_branches,
 )
 from surefix.filters.hypothesis_noise import adapt, innovate
+from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.track_predict import VAGUE_RATE
-from surefix.jit import helper, kernel
-from surefix.types import BoolArray, FloatArray, IntArray
+from surefix.jit import inner, lean_helper, lean_kernel
+from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
+_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced"})
 
-@helper
+
+@inner
 def _apply_velocity(
     motion: Motion,
     bank: Bank,
@@ -97,10 +99,10 @@ def _apply_velocity(
     bank.moved[i] = time
 
 
-@helper
-def _displace(motion: Motion, bank: Bank, jump: int) -> None:
+@lean_helper
+def _displace(motion: Motion, bank: Bank, place: IntArray, jump: int) -> None:
     """Forget the positions, or the rates, that jump here by a decision made beforehand."""
-    for i in range(bank.number[0]):
+    for i in place[: bank.number[0]]:
         for a in range(motion.axes):
             if (jump >> (motion.axes + a)) & 1:
                 change_rate(bank.covariance[i, a], motion.order, 0.0, VAGUE_RATE)
@@ -108,52 +110,65 @@ def _displace(motion: Motion, bank: Bank, jump: int) -> None:
                 bank.seen[i, a] = False
 
 
-@helper
-def _commit_lasting(motion: Motion, prior: Prior, bank: Bank, time: float, said: IntArray) -> None:
+@lean_helper
+def _commit_lasting(
+    motion: Motion, prior: Prior, bank: Bank, place: IntArray, time: float, said: IntArray
+) -> None:
     """Take the runs for true jumps that last too long, or longer than the track before them."""
     for i in range(bank.number[0]):
-        if bank.run[i] < 0 or bank.length[i] < CONFIRMED:
+        k = place[i]
+        if bank.run[k] < 0 or bank.length[k] < CONFIRMED:
             continue
-        longest = min(prior.longest, bank.opened[i] - bank.began[i])
-        if time - bank.opened[i] >= longest:
+        longest = min(prior.longest, bank.opened[k] - bank.began[k])
+        if time - bank.opened[k] >= longest:
             for a in range(motion.axes):
-                commit(bank.mean[i, a], bank.covariance[i, a], motion.order + 1)
-            bank.run[i] = -1
-            bank.began[i] = bank.opened[i]
-            bank.missed[i] = 0
+                commit(bank.mean[k, a], bank.covariance[k, a], motion.order + 1)
+                bank.missed[k, a] = 0
+            bank.run[k] = -1
+            bank.began[k] = bank.opened[k]
             said[i] |= COMMIT
 
 
-@helper
+@inner
 def _close_ranks(
-    motion: Motion, bank: Bank, keep: BoolArray, origin: IntArray, said: IntArray
-) -> int:
-    """Merge what is alike and close the gaps; gives how many hypotheses are left."""
-    merge(motion, bank, bank.number[0], keep)
+    motion: Motion, bank: Bank, place: IntArray, work: Scratch, origin: IntArray, said: IntArray
+) -> None:
+    """Merge what is alike and close the gaps."""
+    keep = work.keep
+    merge(motion, bank, place, keep, work.share)
     left = 0
     for i in range(bank.number[0]):
         if not keep[i]:
             continue
-        if left != i:
-            copy_hypothesis(bank, left, bank, i, motion.axes, motion.order + 1)
-            bank.weight[left] = bank.weight[i]
-            origin[left] = origin[i]
-            said[left] = said[i]
+        place[left], place[i] = place[i], place[left]
+        bank.weight[left] = bank.weight[i]
+        origin[left] = origin[i]
+        said[left] = said[i]
         left += 1
-    return left
+    bank.number[0] = left
 
 
-@helper
+@inner
 def _judge(
-    motion: Motion, prior: Prior, bank: Bank, k: int, said: IntArray, fix: bool, out: Found
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    place: IntArray,
+    k: int,
+    said: IntArray,
+    fix: bool,
+    share: FloatArray,
+    out: Found,
 ) -> int:
     """Probabilities of the components of epoch k, and what the best hypothesis says of runs.
 
     A jump is told with a ``fix``, of which the leading axis is seen, and not with a depth.
+    ``share`` becomes the probabilities of the hypotheses.
     """
     d = motion.axes
     for i in range(bank.number[0]):
         w = math.exp(bank.weight[i])
+        share[i] = w
         running = said[i] & (OPEN | CONTINUE) and not said[i] & COMMIT
         position = w * POOR_WEIGHT if said[i] & POOR else w
         velocity = w * POOR_WEIGHT if said[i] & VELOCITY_POOR else w
@@ -163,11 +178,12 @@ def _judge(
             if not said[i] & VELOCITY_OUT:
                 out.weight[k, d + a] += velocity
     best = best_of(bank.weight, bank.number[0])
+    row = place[best]
     if said[best] & (OPEN | CONTINUE) and not said[best] & COMMIT:
-        out.run[k] = bank.length[best]
+        out.run[k] = bank.length[row]
         for a in range(d):
-            out.offset[k, a] = bank.mean[best, a, motion.order]
-    began = bank.began[best]
+            out.offset[k, a] = bank.mean[row, a, motion.order]
+    began = bank.began[row]
     if fix and not math.isnan(began):
         if began > bank.announced[0] + 0.5 * prior.longest:
             out.since[k] = began
@@ -176,98 +192,115 @@ def _judge(
     return best
 
 
-@kernel
+@lean_kernel
 def _run(
     motion: Motion,
     prior: Prior,
     epochs: Epochs,
-    one: Bank,
-    two: Bank,
+    bank: Bank,
+    place: IntArray,
+    work: Scratch,
+    adapting: bool,
     found: Found,
     trail: Trail,
-) -> int:
-    """Loop of `filter_hypotheses`; gives how often the banks changed places."""
-    d, n = motion.axes, motion.order + 1
-    most, traced = one.weight.shape[0], trail.best.shape[0] > 0
-    score = np.empty(most * BRANCHES)
-    parent = np.empty(most * BRANCHES, np.int64)
-    code = np.empty(most * BRANCHES, np.int64)
-    chosen = np.empty(most, np.int64)
-    origin, before = np.empty(most, np.int64), np.empty(most, np.int64)
-    said, spoken = np.empty(most, np.int64), np.empty(most, np.int64)
-    keep = np.empty(most, np.bool_)
-    r, share = np.empty(2 * d), np.zeros(d)
-    adapting = np.any(prior.adapt > 0.0)
-    swaps = 0
+) -> None:
+    """Loop of `filter_hypotheses`: predict, weigh velocity and position, merge, report.
+
+    The i-th hypothesis, best first, is in row ``place[i]`` of the bank, but for its weight, which
+    is the i-th: what a hypothesis knows is moved only where several come from it.
+    """
+    d, r, said = motion.axes, work.r, work.said
     speed = prior.sigma_velocity
-    time = one.time[0]
-    if math.isnan(time):
+    if math.isnan(bank.time[0]):
         for a in range(d):
             for s in range(1, motion.order):
-                one.covariance[0, a, s, s] = speed * speed
+                bank.covariance[place[0], a, s, s] = speed * speed
     for k in range(len(epochs.time)):
-        dt = 0.0 if math.isnan(time) else epochs.time[k] - time
         time = epochs.time[k]
+        dt = 0.0 if math.isnan(bank.time[0]) else time - bank.time[0]
         sensor = epochs.sensor[k] if len(epochs.sensor) else 0
         z, forced = epochs.z[k], epochs.fixed[k]
-        found.scale[k] = one.scale[sensor]
-        for a in range(d):
-            r[a] = epochs.variance[k, a] * one.scale[sensor]
-            r[d + a] = epochs.variance[k, d + a]
-        if epochs.jump[k]:
-            _displace(motion, one, epochs.jump[k])
-        for i in range(one.number[0]):
-            origin[i], said[i] = i, 0
-            if dt > 0.0:
-                for a in range(d):
-                    predict_axis(
-                        one.mean[i, a], one.covariance[i, a], motion.order, dt, motion.density[a]
-                    )
-        innovate(motion, one, k, z, r, found, share)
+        found.scale[k] = bank.scale[sensor]
         placed = moved = False
         for a in range(d):
+            r[a] = epochs.variance[k, a] * bank.scale[sensor]
+            r[d + a] = epochs.variance[k, d + a]
             placed = placed or not math.isnan(z[a])
             moved = moved or not math.isnan(z[d + a])
+        if epochs.jump[k]:
+            _displace(motion, bank, place, epochs.jump[k])
+        for i in range(bank.number[0]):
+            work.origin[i], said[i] = i, 0
+            if dt > 0.0:
+                for a in range(d):
+                    m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
+                    predict_axis(m, P, motion.order, dt, motion.density[a])
+        innovate(motion, bank, place, k, z, r, found, work.noise)
         for stage in range(2):
             if stage == 0 and moved:
                 total = velocity_branches(
-                    motion, prior, one, z, r, forced, time, sensor, score, parent, code
+                    motion,
+                    prior,
+                    bank,
+                    place,
+                    z,
+                    r,
+                    forced,
+                    time,
+                    sensor,
+                    work.score,
+                    work.parent,
+                    work.code,
                 )
             elif stage == 1 and placed:
                 total = position_branches(
-                    motion, prior, one, z, r, forced, time, sensor, score, parent, code
+                    motion,
+                    prior,
+                    bank,
+                    place,
+                    z,
+                    r,
+                    forced,
+                    time,
+                    sensor,
+                    work.score,
+                    work.parent,
+                    work.code,
+                    work.parts,
                 )
             else:
                 continue
-            before[:], spoken[:] = origin, said
-            count, norm = keep_best(score, total, chosen, two.weight)
+            count, norm = keep_best(work.score, total, work.chosen, bank.weight)
             found.evidence[k] += norm
+            for i in range(bank.number[0]):
+                work.before[i], work.spoken[i] = work.origin[i], said[i]
+            give_rows(
+                bank, place, work.parent, work.chosen, count, work.claims, work.spare, work.row
+            )
             for i in range(count):
-                p, what = parent[chosen[i]], code[chosen[i]]
-                copy_hypothesis(two, i, one, p, d, n)
-                origin[i] = before[p]
-                said[i] = spoken[p] | what
+                p, what = work.parent[work.chosen[i]], work.code[work.chosen[i]]
+                work.origin[i] = work.before[p]
+                said[i] = work.spoken[p] | what
                 if stage == 1:
-                    apply_position(motion, two, i, z, r, what, time, sensor, speed)
+                    apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
                 else:
-                    _apply_velocity(motion, two, i, z, r, what, time, sensor)
-            one, two = two, one
-            one.number[0] = count
-            swaps += 1
-        _commit_lasting(motion, prior, one, time, said)
-        if one.number[0] > 1:
-            one.number[0] = _close_ranks(motion, one, keep, origin, said)
-        best = _judge(motion, prior, one, k, said, not math.isnan(z[0]), found)
+                    _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
+        _commit_lasting(motion, prior, bank, place, time, said)
+        if bank.number[0] > 1:
+            _close_ranks(motion, bank, place, work, work.origin, said)
+        fix = not math.isnan(z[0])
+        best = _judge(motion, prior, bank, place, k, said, fix, work.share, found)
         if adapting:
-            adapt(motion, prior, one, k, sensor, share, found)
-        if traced:
+            adapt(motion, prior, bank, k, sensor, work.noise, found)
+        if len(trail.best):
             trail.best[k] = best
-            for i in range(one.number[0]):
-                trail.parent[k, i] = origin[i]
-                trail.code[k, i] = said[i]
-        report(motion, one, said, best, k, found)
-    one.time[0] = time
-    return swaps
+            begin = trail.first[k]
+            for i in range(bank.number[0]):
+                trail.parent[begin + i] = work.origin[i]
+                trail.code[begin + i] = said[i]
+            trail.first[k + 1] = begin + bank.number[0]
+        report(motion, bank, place, work.share, said, best, k, found)
+        bank.time[0] = time
 
 
 def filter_hypotheses(
@@ -294,20 +327,23 @@ def filter_hypotheses(
         The hypotheses after the series, what their mixture says, and how they came about.
     """
     n, most = len(epochs.time), len(bank.weight)
-    one = _copied(bank)
-    shared = {name: getattr(one, name) for name in ("time", "number", "scale", "announced")}
-    two = _copied(bank)._replace(**shared)
+    after = Bank._make(field.copy() for field in bank)
+    place = rows_of(most)
     found = _blank(motion, n)
     rows = n if traced else 0
-    trail = Trail(
-        np.zeros((rows, most), np.int8), np.zeros((rows, most), np.uint16), np.zeros(rows, np.int8)
+    trail = Trail(  # room for all, of which only what is written takes memory
+        np.empty(rows * most, np.uint8),
+        np.empty(rows * most, np.uint16),
+        np.zeros(rows + 1, np.int64),
+        np.zeros(rows, np.uint8),
     )
-    swaps = _run(motion, prior, epochs, one, two, found, trail)
-    return (two if swaps % 2 else one), found, trail
-
-
-def _copied(bank: Bank) -> Bank:
-    return Bank._make(field.copy() for field in bank)
+    adapting = bool(np.any(prior.adapt > 0.0))
+    work = scratch_for(motion.axes, most)
+    _run(motion, prior, epochs, after, place, work, adapting, found, trail)
+    moved = {name: getattr(after, name)[place] for name in _BY_ROW}
+    end = trail.first[-1]
+    trail = trail._replace(parent=trail.parent[:end], code=trail.code[:end])
+    return after._replace(**moved), found, trail
 
 
 def _blank(motion: Motion, n: int) -> Found:

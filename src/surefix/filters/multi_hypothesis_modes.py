@@ -9,7 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from surefix.filters.hypotheses import Bank, Prior, no_hypotheses
+from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
+from surefix.filters.hypothesis_lag import (
+    Followed,
+    filter_decided,
+    not_followed,
+    smooth_windows,
+)
 from surefix.filters.hypothesis_review import deleted_residuals, review
 from surefix.filters.hypothesis_trail import (
     Decisions,
@@ -22,9 +28,6 @@ from surefix.filters.modes import (
     from_filtered,
     from_smoothed,
     rows_of,
-    smoothed_stretch,
-    state_before,
-    write_rows,
 )
 from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.offline import backward, needed_jumps
@@ -64,7 +67,12 @@ def realtime_hypotheses(
 
 
 def lagged_hypotheses(
-    motion: Motion, prior: Prior, epochs: Epochs, lag: float, wanted: BoolArray
+    motion: Motion,
+    prior: Prior,
+    epochs: Epochs,
+    lag: float,
+    wanted: BoolArray,
+    most: int = MOST,
 ) -> Estimate:
     """Estimate every epoch from the past and the ``lag`` seconds that follow it.
 
@@ -76,31 +84,55 @@ def lagged_hypotheses(
         Seconds ≥ 0.
     wanted
         (n,) epochs that are smoothed; the others keep the filter's estimate.
+    most
+        Hypotheses kept.
     """
-    time, n = epochs.time, len(epochs.time)
-    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
+    time, n, states = epochs.time, len(epochs.time), motion.order * motion.axes
+    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion, most))
     last = np.searchsorted(time, time + lag, side="right") - 1
-    recovery, kept, said = _steady(prior), blank(motion, n), undecided(motion, n)
-    state, parts = start(motion, recovery), []
+    kept, said = not_followed(motion, n), undecided(motion, n)
+    mean, sigma = np.empty((n, states)), np.empty((n, states))
     seen, head, done = np.isfinite(epochs.z), 0, 0
     while head < n:
         slot = int(trail.best[head - 1]) if head else 0
         until = follow(motion, trail, head, slot, said)
-        state, out, count = _filter(motion, recovery, epochs, said, head, until, state)
-        write_rows(kept, head, out, count)
+        filter_decided(motion, prior.sigma_velocity, epochs, said, head, until, kept)
+        ready = max(int(np.searchsorted(last, until)), done) if until < n else n
+        smooth_windows(motion, time, said.jump, kept, last, wanted, done, ready, mean, sigma)
         if until == n:
             break
-        ready = max(int(np.searchsorted(last, until)), done)
-        parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, ready))
         done = ready
         first = min(decide(motion, seen, trail, until, done, said), until)
-        before = state_before(motion, recovery, time, kept, first, state)
-        state, out, count = _filter(motion, recovery, epochs, said, first, until + 1, before)
-        write_rows(kept, first, out, count)
         head = until + 1
-    parts.append(smoothed_stretch(motion, recovery, time, kept, last, wanted, done, n))
-    whole = Estimate(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
-    return _named(motion, epochs, said, whole)
+        filter_decided(motion, prior.sigma_velocity, epochs, said, first, head, kept)
+        if head == n:
+            smooth_windows(motion, time, said.jump, kept, last, wanted, done, n, mean, sigma)
+    return _named(motion, epochs, said, _lagged(motion, said, seen, kept, mean, sigma))
+
+
+def _lagged(
+    motion: Motion,
+    said: Decisions,
+    seen: BoolArray,
+    kept: Followed,
+    mean: FloatArray,
+    sigma: FloatArray,
+) -> Estimate:
+    """Read what was followed as an estimate, the jumps and runs not yet named."""
+    n = len(mean)
+    standardised = np.where(seen, kept.standardised, np.nan)
+    return Estimate(
+        mean,
+        sigma,
+        np.where(seen, said.fixed, np.nan),
+        np.abs(standardised),
+        standardised,
+        said.jump,
+        np.full((n, motion.groups), np.nan),
+        said.run,
+        np.full((n, motion.axes), np.nan),
+        np.ones(n),
+    )
 
 
 def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate:

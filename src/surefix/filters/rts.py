@@ -13,9 +13,10 @@ import numpy as np
 
 from surefix.filters.records import Filtered, Motion, Recovery
 from surefix.filters.track_predict import predict_factor
-from surefix.jit import helper, kernel
-from surefix.linalg import triangularize
+from surefix.jit import helper, inlined, kernel
+from surefix.linalg import triangularize_rows
 from surefix.models.motion import propagate_rows
+from surefix.rows import ONE, Size, add_row, clear_row, copy_row, part, scratch, size_of, width
 from surefix.types import FloatArray, IntArray
 
 __all__ = ["Smoothed", "leave_one_out", "smooth", "smooth_lag"]
@@ -29,9 +30,12 @@ class Smoothed(NamedTuple):
 
 
 class _Backward(NamedTuple):
-    """Per epoch k: ``x_k = x_f + G (x_{k+1} − F x_f)``, ``P_k = floor + G P_{k+1} Gᵀ``."""
+    """Per epoch k: ``x_k = x_f + G (x_{k+1} − F x_f)``, ``P_k = floor + G P_{k+1} Gᵀ``.
 
-    gain: FloatArray
+    ``gain_T`` holds Gᵀ.
+    """
+
+    gain_T: FloatArray
     floor: FloatArray
     predicted: FloatArray
 
@@ -52,7 +56,7 @@ def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filte
     out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
     if n:
         back = _backward(motion, recovery, time, filtered)
-        _smooth(filtered, back, np.arange(n), np.full(n, n - 1), True, out)
+        _smooth(filtered, back, np.arange(n), np.full(n, n - 1), True, out, size_of(states))
     return out
 
 
@@ -79,7 +83,7 @@ def smooth_lag(
     out = Smoothed(np.empty((len(last), states)), np.empty((len(last), states, states)))
     if len(last):
         back = _backward(motion, recovery, time, filtered)
-        _smooth(filtered, back, rows, last, False, out)
+        _smooth(filtered, back, rows, last, False, out, size_of(states))
     return out
 
 
@@ -90,82 +94,101 @@ def _backward(
     back = _Backward(
         np.zeros((n, states, states)), np.zeros((n, states, states)), np.zeros((n, states))
     )
-    _reduce(motion, recovery, time, filtered, back)
+    _reduce(motion, recovery, time, filtered, back, size_of(states), size_of(2 * states))
     return back
 
 
 @kernel
 def _reduce(
-    motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered, back: _Backward
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    filtered: Filtered,
+    back: _Backward,
+    states: Size,
+    both: Size,
 ) -> None:
     """Reduce ``[[F S, G], [S, 0]]`` to ``[[L, 0], [Y, D]]``: gain ``Y L⁻¹``, floor ``D Dᵀ``."""
-    epochs, n = filtered.mean.shape
-    A = np.empty((2 * n, 2 * n))
-    for k in range(epochs - 1):
-        S, dt = filtered.factor[k], time[k + 1] - time[k]
+    n = width(states)
+    A, v = scratch(both, both), scratch(ONE, both)
+    y, D_T = scratch(ONE, states), scratch(states, states)
+    for k in range(time.shape[0] - 1):
+        dt, at = time[k + 1] - time[k], k * n * n
+        S = part(filtered.factor, at, states, states)
+        gain_T = part(back.gain_T, at, states, states)
+        floor = part(back.floor, at, states, states)
         predict_factor(A, S, motion, dt, filtered.jump[k + 1], recovery)
+        mean, predicted = (
+            part(filtered.mean, k * n, states, ONE),
+            part(back.predicted, k * n, states, ONE),
+        )
         for i in range(n):
-            back.predicted[k, i] = filtered.mean[k, i]
+            predicted[i, 0] = mean[i, 0]
+            clear_row(A, n + i, both)
             for j in range(n):
                 A[n + i, j] = S[i, j]
-                A[n + i, n + j] = 0.0
-        propagate_rows(back.predicted[k].reshape(n, 1), motion.order, motion.axes, dt, 1)
-        triangularize(A, 2 * n, 2 * n)
+        propagate_rows(predicted, motion.order, motion.axes, dt, 1)
+        triangularize_rows(A, v, both)
+        for j in range(n - 1, -1, -1):
+            for i in range(n):
+                y[0, i] = A[n + i, j]
+                D_T[j, i] = A[n + i, n + j]
+            for l in range(j + 1, n):
+                add_row(y, 0, -A[l, j], gain_T, l, states)
+            clear_row(gain_T, j, states)
+            add_row(gain_T, j, 1.0 / A[j, j] if A[j, j] != 0.0 else 0.0, y, 0, states)
         for i in range(n):
-            for j in range(n - 1, -1, -1):
-                total = A[n + i, j]
-                for l in range(j + 1, n):
-                    total -= back.gain[k, i, l] * A[l, j]
-                back.gain[k, i, j] = total / A[j, j] if A[j, j] != 0.0 else 0.0
-            for j in range(i + 1):
-                total = 0.0
-                for l in range(n):
-                    total += A[n + i, n + l] * A[n + j, n + l]
-                back.floor[k, i, j] = total
-                back.floor[k, j, i] = total
+            clear_row(floor, i, states)
+            for l in range(i + 1):
+                add_row(floor, i, D_T[l, i], D_T, l, states)
 
 
-@helper
+@inlined
 def _step_back(
-    k: int, filtered: Filtered, back: _Backward, x: FloatArray, P: FloatArray, W: FloatArray
+    k: int,
+    filtered: Filtered,
+    back: _Backward,
+    x: FloatArray,
+    P: FloatArray,
+    W: FloatArray,
+    y: FloatArray,
+    states: Size,
 ) -> None:
     """Carry the smoothed state (x, P) of epoch k + 1 back to epoch k, in place."""
-    n = x.shape[0]
+    n, at = width(states), k * width(states) * width(states)
+    gain_T = part(back.gain_T, at, states, states)
+    floor = part(back.floor, at, states, states)
+    mean = part(filtered.mean, k * n, ONE, states)
+    predicted = part(back.predicted, k * n, ONE, states)
+    copy_row(y, 0, mean, 0, states)
+    for l in range(n):
+        add_row(y, 0, x[0, l] - predicted[0, l], gain_T, l, states)
+    copy_row(x, 0, y, 0, states)
     for i in range(n):
-        x[i] -= back.predicted[k, i]
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for l in range(n):
-                total += back.gain[k, i, l] * P[l, j]
-            W[i, j] = total
-    for i in range(n):
-        shift = 0.0
+        clear_row(W, i, states)
         for l in range(n):
-            shift += back.gain[k, i, l] * x[l]
-        W[i, n] = shift
+            add_row(W, i, gain_T[l, i], P, l, states)
     for i in range(n):
-        x[i] = filtered.mean[k, i] + W[i, n]
-        for j in range(i + 1):
-            total = back.floor[k, i, j]
-            for l in range(n):
-                total += W[i, l] * back.gain[k, j, l]
-            P[i, j] = total
-            P[j, i] = total
+        copy_row(P, i, floor, i, states)
+        for l in range(n):
+            add_row(P, i, W[i, l], gain_T, l, states)
 
 
-@helper
-def _begin(k: int, filtered: Filtered, x: FloatArray, P: FloatArray) -> None:
+@inlined
+def _begin(
+    k: int, filtered: Filtered, x: FloatArray, P: FloatArray, W: FloatArray, states: Size
+) -> None:
     """Set (x, P) to the filtered state of epoch k."""
-    n = x.shape[0]
-    S = filtered.factor[k]
+    n = width(states)
+    S = part(filtered.factor, k * n * n, states, states)
+    copy_row(x, 0, part(filtered.mean, k * n, ONE, states), 0, states)
     for i in range(n):
-        x[i] = filtered.mean[k, i]
-        for j in range(n):
-            total = 0.0
-            for l in range(n):
-                total += S[i, l] * S[j, l]
-            P[i, j] = total
+        for l in range(n):
+            W[l, i] = S[i, l]
+    for i in range(n):
+        clear_row(P, i, states)
+        for l in range(n):
+            add_row(P, i, S[i, l], W, l, states)
 
 
 @kernel
@@ -176,23 +199,25 @@ def _smooth(
     last: IntArray,
     whole: bool,
     out: Smoothed,
+    states: Size,
 ) -> None:
     """Smooth epoch ``rows[i]`` with the data up to ``last[i]``; all in one sweep if ``whole``."""
-    epochs, n = out.mean.shape
-    x = np.empty(n)
-    P = np.empty((n, n))
-    W = np.empty((n, n + 1))
+    epochs, n = out.mean.shape[0], width(states)
+    x, y = scratch(ONE, states), scratch(ONE, states)
+    P, W = scratch(states, states), scratch(states, states)
     for k in range(epochs - 1, -1, -1):
         if whole and k < epochs - 1:
-            _step_back(k, filtered, back, x, P, W)
+            _step_back(k, filtered, back, x, P, W, y, states)
         else:
-            _begin(last[k], filtered, x, P)
+            _begin(last[k], filtered, x, P, W, states)
             for j in range(last[k] - 1, rows[k] - 1, -1):
-                _step_back(j, filtered, back, x, P, W)
+                _step_back(j, filtered, back, x, P, W, y, states)
+        copy_row(part(out.mean, k * n, ONE, states), 0, x, 0, states)
+        found = part(out.covariance, k * n * n, states, states)
         for i in range(n):
-            out.mean[k, i] = x[i]
-            for j in range(n):
-                out.covariance[k, i, j] = P[i, j]
+            copy_row(found, i, P, i, states)
+            for j in range(i):
+                found[j, i] = found[i, j]
 
 
 def leave_one_out(
@@ -243,7 +268,8 @@ def _delete_residuals(
 ) -> None:
     m = z.shape[1]
     index = np.empty(m, np.int64)
-    residual = np.empty(m)
+    residual, e_out = np.empty(m), np.empty(m)
+    total, D = np.empty((m, m)), np.empty((m, m))
     for k in range(z.shape[0]):
         for g in range(motion.groups):
             count = 0
@@ -257,9 +283,6 @@ def _delete_residuals(
                     count += 1
             if count == 0:
                 continue
-            total = np.zeros((count, count))
-            D = np.zeros((count, count))
-            e_out = np.zeros(count)
             w = weight[k, g]
             for i in range(count):
                 for j in range(count):

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.sight_records import SightBank, SightModel
 from surefix.jit import helper
 from surefix.linalg import cholesky, solve_lower

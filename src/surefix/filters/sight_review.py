@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.sight_fit import POORER
 from surefix.filters.sight_records import SightModel, SightPrior, Sights
 from surefix.jit import helper, kernel

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypothesis_branches import wrapped
+from surefix.filters.hypothesis_density import wrapped
 from surefix.filters.sight_hypotheses import predict_sight
 from surefix.filters.sight_records import SightModel, SightPrior, Sights
 from surefix.jit import kernel

@@ -17,10 +17,28 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surefix.jit import helper, kernel
+from surefix.jit import helper, inlined, kernel
+from surefix.rows import (
+    Size,
+    add_product,
+    add_row,
+    angle_row,
+    clear_row,
+    copy_row,
+    root_row,
+)
 from surefix.types import FloatArray, IntArray
 
-__all__ = ["BEARING", "COMPONENT", "ELEVATION", "RANGE", "expected", "period_of", "sight"]
+__all__ = [
+    "BEARING",
+    "COMPONENT",
+    "ELEVATION",
+    "RANGE",
+    "expected",
+    "period_of",
+    "sight",
+    "sight_row",
+]
 
 RANGE: Final = 0
 BEARING: Final = 1
@@ -68,6 +86,58 @@ def sight(kind: int, anchor: FloatArray, x: FloatArray, d: int, H: FloatArray) -
     H[1] = -up * north / (flat * distance * distance)
     H[2] = flat / (distance * distance)
     return math.atan2(up, flat)
+
+
+@inlined
+def sight_row(
+    kind: int,
+    anchors: FloatArray,
+    c: int,
+    X: FloatArray,
+    ones: FloatArray,
+    off: FloatArray,
+    Y: FloatArray,
+    row: int,
+    points: Size,
+) -> None:
+    """Values of a sight of many points at once, as `sight` gives them, into a row of ``Y``.
+
+    Parameters
+    ----------
+    kind
+        A code of this module.
+    anchors, c
+        (…, d) m, and which row is the anchor.
+    X
+        (n, points) states, which begin with the position, a point a column.
+    ones, off
+        (1, points) ones, and (3, points) scratch.
+    Y, row
+        (…, points) and the row to fill.
+    points
+        How many, see `surefix.rows`.
+    """
+    d = anchors.shape[1]
+    if kind >= COMPONENT:
+        i = kind - COMPONENT
+        copy_row(Y, row, X, i, points)
+        if i < d:
+            add_row(Y, row, -anchors[c, i], ones, 0, points)
+        return
+    for i in range(3):
+        clear_row(off, i, points)
+        if i < d:
+            copy_row(off, i, X, i, points)
+            add_row(off, i, -anchors[c, i], ones, 0, points)
+    if kind == BEARING:
+        angle_row(Y, row, off, 0, off, 1, points)
+        return
+    clear_row(Y, row, points)
+    for i in range(2 if kind == ELEVATION else 3):
+        add_product(Y, row, off, i, off, i, points)
+    root_row(Y, row, points)
+    if kind == ELEVATION:
+        angle_row(Y, row, off, 2, Y, row, points)
 
 
 @helper

@@ -8,7 +8,7 @@ import numpy as np
 
 from surefix.cleaning.duplicates import constant_axes
 from surefix.filters.hypotheses import MOST_SENSORS, Prior
-from surefix.filters.learning import learn
+from surefix.filters.learning import learn, likelihood
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
 from surefix.models.motion import MODELS
 from surefix.pipelines.options import CleanOptions
@@ -92,7 +92,7 @@ def settle_noise(
     model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
     blocks = tried[model]
     if options.several:
-        blocks = [_learnt(block, model, speed, longest) for block in blocks]
+        model, blocks = _learnt_best(tried, model, speed, longest)
     sigma_position = np.full((len(sensors), 3), np.nan)
     sigma_velocity = np.full((len(sensors), 3), np.nan)
     density = np.zeros(len(axes))
@@ -144,6 +144,38 @@ def _blocks(
         floor = (max(quantum[0] / 12.0**0.5, 1e-9), max(quantum[1] / 12.0**0.5, 1e-9))
         out.append(_Block(block, observations, given, floor, found))
     return out
+
+
+def _learnt_best(
+    tried: dict[str, list[_Block]], plain: str, speed: float, longest: float
+) -> tuple[str, list[_Block]]:
+    """Learn under the likelier motion model; under both, where what is wrong may last or not.
+
+    A run of wrong velocities looks like a livelier motion to the ``plain`` choice, which judges
+    each by itself; the other one depends on figures that are not learnt yet.
+    """
+
+    def fit(name: str, blocks: list[_Block]) -> float:
+        return sum(
+            likelihood(
+                block.observations,
+                block.found,
+                order=MODELS[name],
+                period=0.0,
+                speed=speed,
+                longest=longest,
+            )
+            for block in blocks
+        )
+
+    likely = plain if len(tried) == 1 else max(tried, key=lambda name: fit(name, tried[name]))
+    learnt = {
+        name: [_learnt(block, name, speed, longest) for block in tried[name]]
+        for name in sorted({plain, likely})
+    }
+    if len(learnt) > 1:
+        likely = max(learnt, key=lambda name: fit(name, learnt[name]))
+    return likely, learnt[likely]
 
 
 def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:

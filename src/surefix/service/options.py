@@ -31,13 +31,14 @@ from typing import Any, Final
 from surefix.errors import OptionsError
 from surefix.io.options_file import read_options
 from surefix.io.toml_file import read_toml
+from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
 
 __all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
-SENTENCES: Final = ("GGA", "RMC", "VTG", "GST", "HDT", "DPT")
-"""What can be put out."""
+SENTENCES: Final = (*TYPES, "GBS")
+"""What can be put out; gpsd takes its expected errors from GBS."""
 
 _ROLES: Final = ("fixes", "depth", "heading")
 _TALKER: Final = re.compile(r"[A-Z]{2}")
@@ -161,6 +162,8 @@ def read_live(path: str | Path) -> LiveOptions:
     if given.setdefault("mode", "realtime") != "realtime":
         raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
     journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    if (url := journal.get("url")) is not None:
+        journal["url"] = _beside(place, str(url))
     return LiveOptions(
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
@@ -169,11 +172,17 @@ def read_live(path: str | Path) -> LiveOptions:
     )
 
 
+def _beside(place: Path, url: str) -> str:
+    """Let the path of a SQLite file begin at the folder of the options."""
+    kind, mark, path = url.partition(":///")
+    return f"{kind}{mark}{place.parent / path}" if kind == "sqlite" else url
+
+
 def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> dict[str, Any]:
     table = content.get(name, {})
     if not isinstance(table, dict) or set(table) - keys:
         raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
-    return table
+    return dict(table)
 
 
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:

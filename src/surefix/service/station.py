@@ -27,28 +27,6 @@ from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 __all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
 
 
-@dataclass(frozen=True)
-class Station:
-    """What is known.
-
-    Parameters
-    ----------
-    session
-        Of the cleaning.
-    streams
-        The inputs, as far as they are read; never changed in place.
-    after
-        Number of the last bytes taken.
-    observed
-        s, Unix, of the last fix that was used for good; NaN before.
-    """
-
-    session: Session
-    streams: tuple[NmeaStream, ...]
-    after: int = 0
-    observed: float = math.nan
-
-
 class Latest(NamedTuple):
     """Where the vehicle is.
 
@@ -73,6 +51,28 @@ class Latest(NamedTuple):
     observed: float
 
 
+@dataclass(frozen=True)
+class Station:
+    """What is known.
+
+    Parameters
+    ----------
+    session
+        Of the cleaning.
+    streams
+        The inputs, as far as they are read; never changed in place.
+    after
+        Number of the last bytes taken.
+    shown
+        Where the vehicle was at the last row that is cleaned for good; None before.
+    """
+
+    session: Session
+    streams: tuple[NmeaStream, ...]
+    after: int = 0
+    shown: Latest | None = None
+
+
 def begin_station(options: LiveOptions) -> Station:
     """Begin with nothing received."""
     inputs = [(each.name, each.role) for each in options.inputs]
@@ -86,13 +86,13 @@ class _Stored(NamedTuple):
     session: Session
     streams: tuple[Mapping[str, object], ...]
     after: int
-    observed: float
+    shown: Latest | None
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    return snapshot(_Stored(station.session, states, station.after, station.observed))
+    return snapshot(_Stored(station.session, states, station.after, station.shown))
 
 
 def resumed(options: LiveOptions, content: bytes) -> Station:
@@ -107,7 +107,7 @@ def resumed(options: LiveOptions, content: bytes) -> Station:
     streams = begin_station(options).streams
     for stream, state in zip(streams, known.streams, strict=True):
         stream.resume(state)
-    return Station(known.session, streams, known.after, known.observed)
+    return Station(known.session, streams, known.after, known.shown)
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
@@ -135,8 +135,8 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             session, done = advance(session, piece.source, None)
             batches += done
     after = received[-1].number if received else station.after
-    observed = _observed(batches, station.observed)
-    return Station(session, tuple(streams), after, observed), tuple(batches)
+    shown = _last(batches, station.shown)
+    return Station(session, tuple(streams), after, shown), tuple(batches)
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
@@ -154,7 +154,7 @@ def latest(station: Station, time: float = math.nan) -> Latest | None:
         return None
     logs = [copy.deepcopy(stream).rest() for stream in station.streams]
     batches = end_on_trial(station.session, [_with(logs[0], time), *logs[1:]])
-    return _last(batches, _observed(batches, station.observed))
+    return _last(batches, station.shown)
 
 
 def _with(log: Log, time: float) -> Log:
@@ -183,8 +183,9 @@ def _observed(batches: Sequence[Cleaned], before: float) -> float:
     return before
 
 
-def _last(batches: Sequence[Cleaned], observed: float) -> Latest | None:
-    """The last row of the track that has a position."""
+def _last(batches: Sequence[Cleaned], before: Latest | None) -> Latest | None:
+    """The last row of the track that has a position; that of ``before`` if there is none."""
+    observed = _observed(batches, math.nan if before is None else before.observed)
     for batch in reversed(batches):
         track = batch.track
         known = np.flatnonzero(np.isfinite(track.position[:, :2]).all(axis=1))
@@ -199,4 +200,4 @@ def _last(batches: Sequence[Cleaned], observed: float) -> Latest | None:
                 None if track.geodetic is None else track.geodetic[k],
                 observed,
             )
-    return None
+    return before
