@@ -4,9 +4,15 @@
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+SPARK := $(VENV)/.spark
 CANDIDATES := $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
 KERNELS := build/kernels
 BENCH := .venv-bench
+
+# Spark takes half a gigabyte and is only needed for its tests: it has a lock of its own.
+ONLY_SPARK := pyspark py4j
+COMPILE := --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+  --custom-compile-command 'make lock'
 
 .PHONY: help demo test lint format lock bench clean
 .DEFAULT_GOAL := help
@@ -24,9 +30,9 @@ demo: $(INSTALLED)
 	$(BIN)/surefix demo
 
 # Kernels are compiled afresh: a cached caller can outlive the kernel it calls.
-test: lint
+test: lint $(SPARK)
 	rm -rf $(KERNELS)
-	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m pytest -n 2
+	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m pytest -n 2 --dist loadgroup
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
@@ -40,10 +46,11 @@ format: $(INSTALLED)
 
 lock: $(INSTALLED)
 	$(BIN)/python -m pip install --quiet uv
-	printf 'hatchling\neditables\n' | $(BIN)/uv pip compile --quiet --universal \
-	  --python-version 3.11 --all-extras --group pyproject.toml:dev --generate-hashes --upgrade \
-	  --no-emit-index-url --custom-compile-command 'make lock' \
+	printf 'hatchling\neditables\nsetuptools\n' | $(BIN)/uv pip compile $(COMPILE) --upgrade \
+	  --all-extras --group pyproject.toml:dev $(ONLY_SPARK:%=--no-emit-package %) \
 	  --output-file requirements.lock pyproject.toml -
+	printf '%s\n' $(ONLY_SPARK) | $(BIN)/uv pip compile $(COMPILE) --upgrade \
+	  --constraint requirements.lock --output-file requirements-spark.lock -
 
 # Peers live in an environment of their own, and one that cannot be installed is left out.
 bench: $(BENCH)/.installed
@@ -75,4 +82,10 @@ $(INSTALLED): requirements.lock pyproject.toml
 	  --requirement requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation \
 	  --no-deps --editable .
+	@touch $@
+
+$(SPARK): requirements-spark.lock $(INSTALLED)
+	@echo 'Installing Apache Spark for its tests'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	  --no-build-isolation --requirement requirements-spark.lock
 	@touch $@

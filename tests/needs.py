@@ -1,8 +1,9 @@
-"""Programs that a test talks to: it is skipped, saying so, where one is absent.
+"""Programs and packages that a test needs: it is skipped, saying so, where one is absent.
 
 With ``SUREFIX_REQUIRE_TOOLS=1``, as in CI, a missing program is a failure instead of a skip.
 """
 
+import importlib
 import os
 import shutil
 
@@ -14,7 +15,18 @@ def tool(*names):
     for name in names:
         if path := shutil.which(name):
             return path
-    text = f"{' or '.join(names)} is not installed"
+    return _absent(f"{' or '.join(names)} is not installed")
+
+
+def package(name):
+    """A module of an optional package."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        return _absent(f"the package {name} is not installed")
+
+
+def _absent(text):
     if os.environ.get("SUREFIX_REQUIRE_TOOLS") == "1":
         pytest.fail(text)
     return pytest.skip(text)

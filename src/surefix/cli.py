@@ -9,22 +9,29 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
-from surefix.cli_inputs import Columns, Depth, Heading, NoChecksum, Target, Velocity, keep_inputs
+from surefix.cli_fleet import fleet
+from surefix.cli_inputs import (
+    Columns,
+    Depth,
+    Heading,
+    NoChecksum,
+    Target,
+    Velocity,
+    chosen_options,
+    keep_inputs,
+)
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
-
-if TYPE_CHECKING:
-    from surefix.pipelines.options import CleanOptions
 
 __all__ = ["app", "clean", "demo", "info", "main", "reproduce"]
 
@@ -161,7 +168,7 @@ def clean(
     from surefix.pipelines.inputs import open_inputs
     from surefix.pipelines.summary import lines, summary
 
-    chosen, columns = _options(
+    chosen, columns = chosen_options(
         options,
         {
             "mode": mode,
@@ -282,6 +289,7 @@ def reproduce(
 
 app.command()(compare)
 app.command()(locate)
+app.command()(fleet)
 app.command()(live)
 app.command()(warmup)
 
@@ -329,20 +337,6 @@ def _use_utf8() -> None:
         reconfigure: Callable[..., None] | None = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(encoding="utf-8", errors="replace")
-
-
-def _options(
-    file: Path | None, given: dict[str, Any], delays: dict[str, float]
-) -> tuple[CleanOptions, dict[str, str]]:
-    """Options of the file, over which those of the command line win, and columns of the file."""
-    from surefix.io.options_file import OptionsFile, read_options
-    from surefix.pipelines.options import options_from
-
-    stored = read_options(file) if file is not None else OptionsFile({}, {})
-    words = {name: value for name, value in given.items() if value is not None}
-    if delays:
-        words["sensor_delay_s"] = {**stored.clean.get("sensor_delay_s", {}), **delays}
-    return options_from({**stored.clean, **words}), stored.columns
 
 
 def _delays(words: list[str]) -> dict[str, float]:

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from surefix.errors import OptionsError
 
-__all__ = ["Columns", "Depth", "Heading", "NoChecksum", "Target", "Velocity", "keep_inputs"]
+if TYPE_CHECKING:
+    from surefix.pipelines.options import CleanOptions
+
+__all__ = [
+    "Columns",
+    "Depth",
+    "Heading",
+    "NoChecksum",
+    "Target",
+    "Velocity",
+    "chosen_options",
+    "keep_inputs",
+]
 
 Columns = Annotated[
     list[str] | None,
@@ -50,3 +62,23 @@ def keep_inputs(inputs: list[Path], outputs: list[Path]) -> None:
     for path in outputs:
         if path.resolve() in read:
             raise OptionsError(f"output {path} is also an input", "another name")
+
+
+def chosen_options(
+    file: Path | None, given: dict[str, Any], delays: dict[str, float]
+) -> tuple[CleanOptions, dict[str, str]]:
+    """Options of the file, over which those of the command line win, and columns of the file.
+
+    Raises
+    ------
+    InputError, OptionsError
+        The file cannot be read, or an option is wrong.
+    """
+    from surefix.io.options_file import OptionsFile, read_options
+    from surefix.pipelines.options import options_from
+
+    stored = read_options(file) if file is not None else OptionsFile({}, {})
+    words = {name: value for name, value in given.items() if value is not None}
+    if delays:
+        words["sensor_delay_s"] = {**stored.clean.get("sensor_delay_s", {}), **delays}
+    return options_from({**stored.clean, **words}), stored.columns

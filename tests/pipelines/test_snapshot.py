@@ -82,3 +82,8 @@ def test_an_estimator_cannot_be_stored():
     session = begin_session([("log", "fixes")], OPTIONS, lambda *_: (None, None))
     with pytest.raises(OptionsError, match="estimator"):
         snapshot(session)
+
+
+def test_options_travel_between_processes():
+    options = replace(OPTIONS, sensor_sigma={"usbl": 0.5})
+    assert pickle.loads(pickle.dumps(options)) == options

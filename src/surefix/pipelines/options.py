@@ -149,6 +149,12 @@ class CleanOptions:
             raise OptionsError(f"held = {self.held!r}", "true or false")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let processes exchange options: their mappings travel as plain ones."""
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        plain = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
+        return options_from, (plain,)
+
     @property
     def loss(self) -> Loss:
         """The robust loss these options ask for; none for a cleaner or several hypotheses."""
