@@ -3,7 +3,7 @@
 A step is written in one transaction before anything of it leaves the house: what was received, what
 it led to, sometimes a snapshot. After a crash the service goes on from the last snapshot and takes
 what was received since through the same steps, so it stands where it stood. SQLite keeps it in one
-file beside the service; PostgreSQL, by its URL, on another machine.
+file beside the service.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sqlalchemy import (
-    BigInteger,
     Column,
     Double,
     Integer,
@@ -28,6 +27,7 @@ from sqlalchemy import (
     event,
     select,
 )
+from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.engine import Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, SQLAlchemyError
 
@@ -39,11 +39,10 @@ from surefix.types import Log
 __all__ = ["Journal", "Received", "Told", "journal_logs", "open_journal"]
 
 _TABLES = MetaData()
-_NUMBER = BigInteger().with_variant(Integer, "sqlite")
 _RECEIVED = Table(
     "received",
     _TABLES,
-    Column("number", _NUMBER, primary_key=True, autoincrement=False),
+    Column("number", Integer, primary_key=True, autoincrement=False),
     Column("source", SmallInteger, nullable=False),
     Column("time", Double),
     Column("data", LargeBinary, nullable=False),
@@ -51,8 +50,8 @@ _RECEIVED = Table(
 _TOLD = Table(
     "told",
     _TABLES,
-    Column("number", _NUMBER, primary_key=True, autoincrement=False),
-    Column("after", _NUMBER, nullable=False),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("after", Integer, nullable=False),
     Column("time", Double),
     Column("kind", Text, nullable=False),
     Column("text", Text, nullable=False),
@@ -60,7 +59,7 @@ _TOLD = Table(
 _STATE = Table(
     "state",
     _TABLES,
-    Column("after", _NUMBER, primary_key=True, autoincrement=False),
+    Column("after", Integer, primary_key=True, autoincrement=False),
     Column("snapshot", LargeBinary, nullable=False),
 )
 _SOURCE = Table(
@@ -141,7 +140,7 @@ class Journal:
         Raises
         ------
         OutputError
-            The disk is full, or the data base is away.
+            The disk is full, or the file cannot be written.
         """
         try:
             with self._engine.begin() as connection:
@@ -156,7 +155,7 @@ class Journal:
         except SQLAlchemyError as error:
             raise OutputError(
                 f"the journal cannot be written: {_said(error)}",
-                "a disk with room, or a data base that answers",
+                "a disk with room",
             ) from error
 
     def snapshots(self) -> list[tuple[int, bytes]]:
@@ -250,7 +249,7 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
     Parameters
     ----------
     url
-        ``sqlite:///mission.db``, or ``postgresql://…``.
+        ``sqlite:///mission.db``.
     new
         False: it must be there.
 
@@ -263,25 +262,20 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
     """
     try:
         parsed = make_url(url)
-        if parsed.drivername == "postgresql":
-            parsed = parsed.set(drivername="postgresql+psycopg")
-        if parsed.get_backend_name() not in ("sqlite", "postgresql"):
+        if parsed.get_backend_name() != "sqlite" or not parsed.database:
             raise ArgumentError
     except ArgumentError as error:
-        raise OptionsError(
-            f"journal {url!r}", "sqlite:///PATH or postgresql://USER@HOST/NAME"
-        ) from error
-    place = Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else None
-    if place is not None and not new and not is_sqlite(place):
+        raise OptionsError(f"journal {url!r}", "sqlite:///PATH") from error
+    place = Path(parsed.database)
+    if not new and not is_sqlite(place):
         raise InputError(f"{place}: not a journal", "a file that surefix live has written")
-    if place is not None and place.exists() and not _sound(place):
+    if place.exists() and not _sound(place):
         aside = f"{place.name}.damaged-{time.strftime('%Y%m%dT%H%M%S')}"
         for part in ("", "-wal", "-shm"):
             if (old := place.with_name(place.name + part)).exists():
                 old.rename(place.with_name(aside + part))
-    engine = create_engine(parsed, pool_pre_ping=place is None)
-    if place is not None:
-        event.listen(engine, "connect", _durable)
+    engine = create_engine(parsed)
+    event.listen(engine, "connect", _durable)
     try:
         _TABLES.create_all(engine)
     except SQLAlchemyError as error:
@@ -344,11 +338,7 @@ def _time(stored: float | None) -> float:
 def _insert(connection: Connection, table: Table, rows: list[dict[str, object]]) -> None:
     if not rows:
         return
-    if connection.dialect.name == "postgresql":
-        from sqlalchemy.dialects.postgresql import insert as upsert
-    else:
-        from sqlalchemy.dialects.sqlite import insert as upsert  # type: ignore[assignment]
-    connection.execute(upsert(table).on_conflict_do_nothing(), rows)
+    connection.execute(insert(table).on_conflict_do_nothing(), rows)
 
 
 def _said(error: SQLAlchemyError) -> str:
