@@ -32,7 +32,7 @@ from sqlalchemy.engine import Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, SQLAlchemyError
 
 from surefix.errors import InputError, OptionsError, OutputError
-from surefix.io.nmea_log import NmeaStream
+from surefix.io.nmea_stream import NmeaStream
 from surefix.io.sqlite_file import is_sqlite
 from surefix.types import Log
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.io.journal import Received
-from surefix.io.nmea_log import NmeaStream
+from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
