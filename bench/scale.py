@@ -1,9 +1,9 @@
 """What cleaning costs from 10⁴ fixes on: seconds, and the most memory in use at one time.
 
 Run ``python bench/scale.py [--most 1e7] [--methods igg3] [--modes realtime] [--json FILE]``, and
-``python bench/scale.py --draw bench/scale.json`` for the picture ``docs/scale.svg``. The log has positions
-at 100 Hz, one in twenty wrong; it is read from Parquet and the track written to Parquet. Each run
-is a process of its own.
+``python bench/scale.py --draw bench/scale.json`` for the picture ``docs/scale.svg``. The log has
+positions at 100 Hz, one in twenty wrong; it is read from Parquet and the track written to Parquet.
+Each run is a process of its own.
 """
 
 from __future__ import annotations
