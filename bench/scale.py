@@ -1,9 +1,9 @@
 """What cleaning costs from 10⁴ fixes on: seconds, and the most memory in use at one time.
 
 Run ``python bench/scale.py [--most 1e7] [--methods igg3] [--modes realtime] [--json FILE]``, and
-``python bench/scale.py --draw FILE.json`` for the picture ``docs/scale.svg``. The log has positions
-at 100 Hz, one in twenty wrong; it is read from Parquet and the track written to Parquet. Each run
-is a process of its own.
+``python bench/scale.py --draw bench/scale.json`` for the picture ``docs/scale.svg``. The log has
+positions at 100 Hz, one in twenty wrong; it is read from Parquet and the track written to Parquet.
+Each run is a process of its own.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import pyarrow.parquet as pq
 
 from measured import conclude
 
+PART = 250_000
 RUN = "import sys; sys.argv[0] = 'surefix'; from surefix.cli import main; main()"
 PICTURE = Path(__file__).parents[1] / "docs" / "scale.svg"
 
@@ -50,7 +51,7 @@ def _rows(
 ) -> Iterator[dict[str, str | float]]:
     sizes = [10**k for k in range(4, 8) if 10**k <= most]
     for size in sizes:
-        pq.write_table(fixes(size), folder / f"{size}.parquet")
+        _write(folder / f"{size}.parquet", size)
     for method in methods:
         for mode in modes:
             words = ["--method", method, "--mode", mode, "-o", str(folder / "track.parquet")]
@@ -67,10 +68,18 @@ def _rows(
                 }
 
 
-def fixes(n: int) -> pa.Table:
-    """Positions at 100 Hz on a curved way, noise 0.5 m, one in twenty wrong by some 30 m."""
+def _write(place: Path, size: int) -> None:
+    """Write a log part by part: a child's memory counts from that of this process."""
     random = np.random.default_rng(1)
-    time = 0.01 * np.arange(n)
+    schema = pa.schema([(name, pa.float64()) for name in ("time", "x", "y")])
+    with pq.ParquetWriter(place, schema) as writer:
+        for first in range(0, size, PART):
+            writer.write_table(_fixes(random, first, min(PART, size - first)))
+
+
+def _fixes(random: np.random.Generator, first: int, n: int) -> pa.Table:
+    """Positions at 100 Hz on a curved way, noise 0.5 m, one in twenty wrong by some 30 m."""
+    time = 0.01 * np.arange(first, first + n)
     x, y = 300.0 * np.sin(time / 200.0), 300.0 * np.cos(time / 310.0)
     x, y = (axis + random.normal(0.0, 0.5, n) for axis in (x, y))
     wrong = random.random(n) < 0.05
