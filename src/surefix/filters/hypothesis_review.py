@@ -100,22 +100,31 @@ def review(
     out = fixed.copy()
     d = motion.axes
     far = np.nansum(residual[:, :d] ** 2 / variance[:, :d], axis=1) > GROSS
-    row = _rows_of_wrong(d, prior, epochs.z, (fixed == 0.0) & (far & ~locked[:, 0])[:, None])
+    wrong = (fixed == 0.0) & (far & ~locked[:, 0])[:, None]
+    row = _rows_of_wrong(d, prior, epochs.time, epochs.z, wrong)
     _review(d, prior, residual, variance, epochs.variance, locked, row, out)
     return np.where(np.isnan(epochs.fixed), out, epochs.fixed)
 
 
-def _rows_of_wrong(axes: int, prior: Prior, z: FloatArray, out: BoolArray) -> FloatArray:
+def _rows_of_wrong(
+    axes: int, prior: Prior, time: FloatArray, z: FloatArray, out: BoolArray
+) -> FloatArray:
     """(n,) logarithm of how much likelier than usual a fix is wrong, by the fixes beside it.
 
     Of these only gross errors count, ``out`` (n, m): a sensor that wanders would confirm itself.
-    Those of a run with a common offset are another matter.
+    Those of a run with a common offset are another matter, and what lasts longer than a run may is
+    no row of errors.
     """
     odds: FloatArray = np.zeros(len(z))
     rows = np.flatnonzero(np.isfinite(z[:, :axes]).any(axis=1))
     lead = np.isfinite(z[rows, :axes]).argmax(axis=1)
     wrong = np.zeros(len(rows) + 2 * ROW, np.bool_)
-    wrong[ROW:-ROW] = out[rows, lead]
+    inside = out[rows, lead]
+    edges = np.diff(inside.astype(np.int64), prepend=0, append=0)
+    for first, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        if time[rows[end - 1]] - time[rows[first]] >= prior.longest:
+            inside[first:end] = False
+    wrong[ROW:-ROW] = inside
     more = math.log(prior.row / prior.isolated)
     less = math.log1p(-prior.row) - math.log1p(-prior.isolated)
     n = len(rows)

@@ -41,7 +41,7 @@ _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
 _FEWEST = 0.1  # share of good triples of neighbours that tell the scale of differences …
 _DIFFER = 0.25  # … and share of the scale of differences that no figure to begin with falls below
-_MANY = 0.2  # share of gross errors supposed meanwhile
+_MANY = 0.2  # share of gross errors supposed meanwhile, in rows or not
 _BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
 _LEAST = 0.3  # share of the figures begun with that none falls below
@@ -167,7 +167,7 @@ def likelihood(
     axes = sample.z.shape[1] // 2
     if len(sample.time) < 3 or not np.isfinite(figures.position).any():
         return -figures.cost
-    prior = supposed(axes, *_usual(figures), speed, longest)._replace(isolated=_MANY)
+    prior = supposed(axes, *_usual(figures), speed, longest)._replace(isolated=_MANY, row=_MANY)
     motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
     return _evidence(motion, figures, prior, epochs, _BRIEFLY)
 
@@ -220,7 +220,7 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
         size = float(np.median(np.abs(residual[:, :axes][out])))
         spread[:axes] = max(size, _LEAST_WILD * sigma)
     return prior._replace(
-        isolated=share("isolated", whole.sum()),
+        isolated=share("isolated", alone.sum()),
         partial=share("partial", some.sum()),
         poor=share("poor", poor.sum()),
         manoeuvre=share("manoeuvre", turns),
@@ -306,7 +306,7 @@ def _begun(
     for trial in trials:
         spread = prior.spread.copy()
         spread[: motion.axes] = _WILD * _usual(trial)[0]
-        ready = prior._replace(isolated=_MANY, spread=spread)
+        ready = prior._replace(isolated=_MANY, row=_MANY, spread=spread)
         reached.append(_evidence(motion, trial, ready, _epochs(sample, trial), _BRIEFLY))
     return trials[int(np.argmax(reached))]
 
