@@ -51,7 +51,7 @@ def descend(
     >>> found = descend(
     ...     lambda x: float(x @ x), np.array([[2.0], [1.0]]), near=1e-6, level=1e-9, most=100
     ... )
-    >>> abs(found.x[0]) < 1e-4
+    >>> bool(abs(found.x[0]) < 1e-4)
     True
     """
     corner = np.array(simplex, dtype=np.float64)
