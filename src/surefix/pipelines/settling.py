@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from surefix.cleaning.duplicates import idle_axes, start_repeats
+from surefix.errors import OptionsError
+from surefix.filters.hypotheses import MOST_SENSORS
 from surefix.pipelines.judge import begin
 from surefix.pipelines.latency import Late, find_late, late_events
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows, take_rows
 from surefix.pipelines.setup import Setup, localise, settle
 from surefix.pipelines.state import Session
-from surefix.types import BoolArray, Event
+from surefix.types import BoolArray, Event, IntArray
 
 __all__ = ["begin_rows", "settle_session"]
 
@@ -46,6 +48,11 @@ def settle_session(
     usable
         (n,) rows that may be learnt from.
 
+    Raises
+    ------
+    OptionsError
+        A sensor is named that the log does not have; or as `surefix.pipelines.setup.settle`.
+
     Returns
     -------
     session, events, late
@@ -54,7 +61,16 @@ def settle_session(
     """
     options, head = session.options, _head(session.options)
     rows, usable = take_rows(rows, head), usable[head]
-    setup = settle(rows, usable, list(session.sensors), options)
+    unknown = sorted({*options.sensor_sigma, *options.sensor_delay_s} - {*session.sensors})
+    if unknown:
+        known = ", ".join(session.sensors)
+        raise OptionsError(f"options for sensor {unknown[0]!r}", f"one of {known}")
+    numbers, first, rank = np.unique(rows.fixes.sensor, return_index=True, return_inverse=True)
+    met = np.argsort(first)  # the sensors of the head in the order in which they appear
+    ranked = rows.fixes._replace(sensor=np.argsort(met)[rank])
+    names = [session.sensors[number] for number in numbers[met]]
+    setup = settle(rows._replace(fixes=ranked), usable, names, options)
+    setup = _numbered(setup, numbers[met])
     late = _late(session, setup, rows, usable)
     removed = bool(late) and options.latency == "remove"
     events = late_events(late, removed=removed)
@@ -64,6 +80,20 @@ def settle_session(
     events = [*events, *setup.events, *_idle_events(session, geographic=geographic)]
     track = begin(options, setup.motion, setup.recovery, setup.prior) if setup.axes else None
     return replace(session, setup=setup, filter=track), tuple(events), ()
+
+
+def _numbered(setup: Setup, met: IntArray) -> Setup:
+    """Give the figures of the sensors that were ``met`` the places of their numbers."""
+    count = int(met.max(initial=-1)) + 1
+    position, velocity = (np.full((count, 3), np.nan) for _ in range(2))
+    offset, prior = np.zeros(count), setup.prior
+    position[met], velocity[met], offset[met] = setup.position, setup.velocity, setup.height_offset
+    if prior is not None:
+        told = met[:MOST_SENSORS] < MOST_SENSORS
+        adapt = np.zeros_like(prior.adapt)
+        adapt[met[:MOST_SENSORS][told]] = prior.adapt[: len(met)][told]
+        prior = prior._replace(adapt=adapt)
+    return replace(setup, position=position, velocity=velocity, height_offset=offset, prior=prior)
 
 
 def _head(options: CleanOptions) -> slice:

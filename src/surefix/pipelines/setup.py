@@ -104,11 +104,8 @@ def settle(rows: Rows, usable: BoolArray, sensors: list[str], options: CleanOpti
     Raises
     ------
     OptionsError
-        A sensor is named that the log does not have, or the lag is too short for the method.
+        The lag is too short for the method.
     """
-    unknown = sorted({*options.sensor_sigma, *options.sensor_delay_s} - set(sensors))
-    if unknown:
-        raise OptionsError(f"options for sensor {unknown[0]!r}", "one of " + ", ".join(sensors))
     frame, origin = _frame(rows, usable)
     position, velocity = localise(rows, frame, origin)
     position[~usable], velocity[~usable] = np.nan, np.nan
