@@ -15,7 +15,7 @@ from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows, take_rows
 from surefix.pipelines.setup import Setup, localise, settle
 from surefix.pipelines.state import Session
-from surefix.types import BoolArray, Event, IntArray
+from surefix.types import BoolArray, Event, IntArray, Noise
 
 __all__ = ["begin_rows", "settle_session"]
 
@@ -71,6 +71,7 @@ def settle_session(
     names = [session.sensors[number] for number in numbers[met]]
     setup = settle(rows._replace(fixes=ranked), usable, names, options)
     setup = _numbered(setup, numbers[met])
+    setup = replace(setup, noise=_in_order(setup.noise, session.sensors))
     late = _late(session, setup, rows, usable)
     removed = bool(late) and options.latency == "remove"
     events = late_events(late, removed=removed)
@@ -94,6 +95,16 @@ def _numbered(setup: Setup, met: IntArray) -> Setup:
         adapt[met[:MOST_SENSORS][told]] = prior.adapt[: len(met)][told]
         prior = prior._replace(adapt=adapt)
     return replace(setup, position=position, velocity=velocity, height_offset=offset, prior=prior)
+
+
+def _in_order(noise: tuple[Noise, ...], sensors: tuple[str, ...]) -> tuple[Noise, ...]:
+    """Name the sensors in the order of the inputs; each block ends with the noise of the motion."""
+    place = {name: number for number, name in enumerate(sensors)}
+    block, keys = 0, []
+    for each in noise:
+        keys.append((block, place.get(each.sensor, len(place))))
+        block += each.sensor not in place
+    return tuple(noise[i] for i in sorted(range(len(noise)), key=keys.__getitem__))
 
 
 def _head(options: CleanOptions) -> slice:
