@@ -70,6 +70,36 @@ def test_mixed_tracks_are_brought_together_in_the_order_of_arrival(tmp_path, mon
     assert found([file.path for file in target.files], tmp_path).laid_out
 
 
+def test_files_of_different_columns_are_brought_together(tmp_path):
+    """A column may begin in a later file, and whole numbers may become broken ones."""
+    table = in_time(tracks(3))
+    late = table.append_column("z", pa.array(np.arange(table.num_rows) * 0.5))
+    whole = table.set_column(2, "x", pa.array(np.arange(table.num_rows)))
+    for folder, first, then in (("late", table, late), ("whole", whole, table)):
+        place = tmp_path / folder
+        place.mkdir()
+        pq.write_table(first.slice(0, 90), place / "0.parquet")
+        pq.write_table(then.slice(90), place / "1.parquet")
+        data = found([str(place / "0.parquet"), str(place / "1.parquet")], place)
+        target = arranged(data, place / "out")
+        arrange(data, target, str(place), TRACK, pa.string())
+        both = pa.concat_tables([first.slice(0, 90), then.slice(90)], promote_options="permissive")
+        order = pa.compute.index_in(both[TRACK], value_set=target.tracks).to_numpy()
+        (got,) = read(target, place)
+        assert got.equals(both.take(pa.array(np.argsort(order, kind="stable"))))
+
+
+def test_files_that_do_not_fit_together_are_told(tmp_path):
+    table = in_time(tracks(3))
+    words = table.set_column(2, "x", pa.array(["east"] * table.num_rows))
+    paths = [str(tmp_path / "0.parquet"), str(tmp_path / "1.parquet")]
+    pq.write_table(table.slice(0, 90), paths[0])
+    pq.write_table(words.slice(90), paths[1])
+    data = found(paths, tmp_path)
+    with pytest.raises(surefix.InputError, match=r"do not fit together.*one kind of values"):
+        arrange(data, arranged(data, tmp_path / "out"), str(tmp_path), TRACK, pa.string())
+
+
 def test_the_path_may_name_the_track_and_keeps_its_zeros(tmp_path):
     table = tracks(2)
     for name in ("007", "a%20b"):

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from surefix.fleet.dataset import DataSet, File, Piece, hive_value, read_file_rows
+from surefix.fleet.dataset import DataSet, File, Piece, joined, read_piece
 from surefix.types import IntArray
 
 __all__ = ["arrange", "arranged"]
@@ -69,6 +69,11 @@ def arrange(data: DataSet, target: DataSet, root: str, track: str, kind: pa.Data
         From `arranged`.
     root, track, kind
         Of the data set, the column that names the track, and its type.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read any more, or two have values of different kinds in one column.
     """
     folder = Path(target.files[0].path).parent
     if folder.is_dir():
@@ -78,29 +83,27 @@ def arrange(data: DataSet, target: DataSet, root: str, track: str, kind: pa.Data
     draft.mkdir(parents=True)
     bucket = _buckets(target.lengths)
     paths = [draft / Path(file.path).name for file in target.files]
+    form = joined([read_piece(Piece(f.path, 0, 0, f.state), root, track, kind) for f in data.files])
     with contextlib.ExitStack() as stack:
         writers: list[pq.ParquetWriter | None] = [None] * len(paths)
         for file in data.files:
             for first in range(0, file.rows, _READ_ROWS):
                 last = min(first + _READ_ROWS, file.rows)
-                rows = read_file_rows(Piece(file.path, first, last, file.state))
-                named = hive_value(file.path, root, track)
-                if named is not None:
-                    column = pa.repeat(pa.scalar(named, kind), rows.num_rows)
-                    rows = rows.append_column(pa.field(track, kind), column)
-                codes = _codes(rows.column(track), target.tracks, kind)
+                rows = read_piece(Piece(file.path, first, last, file.state), root, track, kind)
+                rows = joined([form, rows])
+                codes = _codes(rows.column(track), target.tracks)
                 order = np.argsort(bucket[codes], kind="stable")
                 ends = np.searchsorted(bucket[codes][order], np.arange(len(paths) + 1))
                 for k in np.flatnonzero(np.diff(ends)):
                     part = rows.take(pa.array(order[ends[k] : ends[k + 1]]))
                     writer = writers[k]
                     if writer is None:
-                        writer = stack.enter_context(pq.ParquetWriter(paths[k], part.schema))
+                        writer = stack.enter_context(pq.ParquetWriter(paths[k], form.schema))
                         writers[k] = writer
-                    writer.write_table(part.cast(writer.schema))
+                    writer.write_table(part)
     for path in paths:
         rows = pq.read_table(path)
-        codes = _codes(rows.column(track), target.tracks, kind)
+        codes = _codes(rows.column(track), target.tracks)
         sorted_path = path.with_suffix(".sorted")
         pq.write_table(
             rows.take(pa.array(np.argsort(codes, kind="stable"))),
@@ -111,7 +114,7 @@ def arrange(data: DataSet, target: DataSet, root: str, track: str, kind: pa.Data
     draft.rename(folder)
 
 
-def _codes(column: pa.ChunkedArray, tracks: pa.Array, kind: pa.DataType) -> IntArray:
+def _codes(column: pa.ChunkedArray, tracks: pa.Array) -> IntArray:
     """Place of each value among the tracks."""
-    found = pc.index_in(column.cast(kind), value_set=tracks)
+    found = pc.index_in(column, value_set=tracks)
     return np.asarray(found.to_numpy(), np.int64)

@@ -30,7 +30,8 @@ __all__ = [
     "digest",
     "hive_value",
     "index",
-    "read_file_rows",
+    "joined",
+    "read_piece",
     "read_unit",
     "schema_of",
     "units",
@@ -210,23 +211,31 @@ def read_unit(unit: Unit, root: str, track: str, kind: pa.DataType) -> pa.Table:
     Raises
     ------
     InputError
-        A file cannot be read any more.
+        A file cannot be read any more, or two have values of different kinds in one column.
     """
-    parts = []
-    for piece in unit.pieces:
-        rows = read_file_rows(piece)
-        named = hive_value(piece.path, root, track)
-        if named is not None:
-            column = pa.repeat(pa.scalar(named, kind), rows.num_rows)
-            rows = rows.append_column(pa.field(track, kind), column)
-        at = rows.column_names.index(track)
-        rows = rows.set_column(at, pa.field(track, kind), rows.column(at).cast(kind))
-        parts.append(rows)
-    return pa.concat_tables(parts, promote_options="permissive")
+    return joined([read_piece(piece, root, track, kind) for piece in unit.pieces])
 
 
-def read_file_rows(piece: Piece) -> pa.Table:
-    """Read some rows of a file, and no row group that holds none of them.
+def joined(parts: Sequence[pa.Table]) -> pa.Table:
+    """Put tables one under the other; a column that one of them lacks is empty there.
+
+    Raises
+    ------
+    InputError
+        Two have values of different kinds in one column.
+    """
+    try:
+        return pa.concat_tables(parts, promote_options="permissive")
+    except pa.ArrowException as error:
+        raise InputError(
+            f"files that do not fit together ({error})", "one kind of values in each column"
+        ) from error
+
+
+def read_piece(piece: Piece, root: str, track: str, kind: pa.DataType) -> pa.Table:
+    """Read some rows of a file, with the column of the track.
+
+    No row group is read that holds none of them.
 
     Raises
     ------
@@ -242,7 +251,13 @@ def read_file_rows(piece: Piece) -> pa.Table:
             rows = file.read_row_groups(list(range(low, high + 1)))
         except (OSError, pa.ArrowException) as error:
             raise _unsound(piece.path, error) from error
-    return rows.slice(piece.first - int(ends[low] - sizes[low]), piece.last - piece.first)
+    rows = rows.slice(piece.first - int(ends[low] - sizes[low]), piece.last - piece.first)
+    named = hive_value(piece.path, root, track)
+    if named is not None:
+        column = pa.repeat(pa.scalar(named, kind), rows.num_rows)
+        return rows.append_column(pa.field(track, kind), column)
+    at = rows.column_names.index(track)
+    return rows.set_column(at, pa.field(track, kind), rows.column(at).cast(kind))
 
 
 def digest(*paths: str) -> str:
