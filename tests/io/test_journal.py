@@ -1,7 +1,9 @@
 """The journal: what is in it is in it, once, and nothing else is."""
 
+import contextlib
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 
 from surefix.errors import InputError, OptionsError, OutputError
-from surefix.io.journal import Received, Told, open_journal
+from surefix.io.journal import Received, Told, journal_logs, open_journal
 
 INPUTS = [("gnss", "fixes"), ("sounder", "depth")]
 
@@ -98,6 +100,21 @@ def test_a_damaged_file_is_put_aside(url, tmp_path):
     assert again.last() == (0, 0)
     (aside,) = tmp_path.glob("mission.db.damaged-*")
     assert aside.read_bytes() == content
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_what_is_only_read_stays_as_it_is(tmp_path, damaged):
+    place = tmp_path / "other.db"
+    with contextlib.closing(sqlite3.connect(place)) as other:
+        other.execute("create table mine (a)")
+    content = bytearray(place.read_bytes())
+    if damaged:
+        content[100:] = np.random.default_rng(1).bytes(len(content) - 100)
+        place.write_bytes(content)
+    with pytest.raises(InputError, match=r"other\.db.*expected .*surefix live"):
+        journal_logs(place)
+    assert [each.name for each in tmp_path.iterdir()] == ["other.db"]
+    assert place.read_bytes() == content
 
 
 _WRITER = """

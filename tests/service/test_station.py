@@ -57,8 +57,11 @@ def pieces(data, size, rng):
     return [data[a:b] for a, b in pairwise(bounds)]
 
 
-def station_of(*names, clean=CLEAN):
-    inputs = tuple(InputOptions(name=name, address=Address("file")) for name in names)
+def station_of(*names, clean=CLEAN, **roles):
+    inputs = tuple(
+        InputOptions(name=name, address=Address("file"), role=roles.get(name, "fixes"))
+        for name in names
+    )
     return begin_station(LiveOptions(clean=clean, inputs=inputs))
 
 
@@ -131,6 +134,15 @@ def test_without_fixes_it_is_carried_on_with_less_and_less_certainty():
     sigmas = [now.sigma_position[0], *(there.sigma_position[0] for there in then)]
     assert np.all(np.diff(sigmas) > 0.0)
     assert latest(station, now.time - 5.0).time == now.time
+
+
+@pytest.mark.parametrize("role", ["depth", "heading"])
+def test_it_is_carried_on_whichever_input_is_named_first(role):
+    station = station_of("other", "boat", other=role)
+    station, _ = receive(station, [Received(1, 1, math.nan, recorded())])
+    station, _ = receive(station, [Received(2, 0, math.nan, b"")])
+    now = latest(station)
+    assert latest(station, now.time + 10.0).time == now.time + 10.0
 
 
 def test_two_receivers_are_two_inputs(tmp_path):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,7 +30,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.engine import Connection, Engine, make_url
-from sqlalchemy.exc import ArgumentError, DatabaseError, SQLAlchemyError
+from sqlalchemy.exc import ArgumentError, DatabaseError, OperationalError, SQLAlchemyError
 
 from surefix.errors import InputError, OptionsError, OutputError
 from surefix.io.nmea_stream import NmeaStream
@@ -117,7 +118,10 @@ class Told(NamedTuple):
 
 
 class Journal:
-    """An open journal; from `open_journal`. Its methods may take as long as the disk does."""
+    """An open journal; from `open_journal`. Its methods may take as long as the disk does.
+
+    Those that read raise `InputError` if it cannot be read.
+    """
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -186,11 +190,10 @@ class Journal:
                 return
             after = int(rows[-1][0])
 
-    def told(self, after: int = 0) -> list[Told]:
-        """Give what was put out after something of a number."""
-        query = select(_TOLD).where(_TOLD.c.number > after).order_by(_TOLD.c.number)
+    def told(self) -> list[Told]:
+        """Give what was put out, in its order."""
         with self._reading() as connection:
-            rows = connection.execute(query)
+            rows = connection.execute(select(_TOLD).order_by(_TOLD.c.number))
             return [Told(n, after, _time(at), *words) for n, after, at, *words in rows]
 
     def sources(self) -> list[tuple[str, str]]:
@@ -234,15 +237,20 @@ class Journal:
         """Let go of the data base."""
         self._engine.dispose()
 
-    def _reading(self) -> Connection:
+    @contextmanager
+    def _reading(self) -> Iterator[Connection]:
         try:
-            return self._engine.connect()
+            with self._engine.connect() as connection:
+                yield connection
         except SQLAlchemyError as error:
-            raise InputError(f"the journal cannot be read: {_said(error)}", "a journal") from error
+            raise InputError(
+                f"{self._engine.url.database}: the journal cannot be read: {_said(error)}",
+                "a journal of surefix live",
+            ) from error
 
 
 def open_journal(url: str, *, new: bool = True) -> Journal:
-    """Open a journal, and begin it if there is none.
+    """Open a journal to write on in it, and begin it if there is none.
 
     A SQLite file that is damaged is put aside as ``NAME.damaged-TIME`` and a new one is begun.
 
@@ -251,7 +259,7 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
     url
         ``sqlite:///mission.db``.
     new
-        False: it must be there.
+        False: it must be there, and is only read: no file is changed or put aside.
 
     Raises
     ------
@@ -267,8 +275,10 @@ def open_journal(url: str, *, new: bool = True) -> Journal:
     except ArgumentError as error:
         raise OptionsError(f"journal {url!r}", "sqlite:///PATH") from error
     place = Path(parsed.database)
-    if not new and not is_sqlite(place):
-        raise InputError(f"{place}: not a journal", "a file that surefix live has written")
+    if not new:
+        if not is_sqlite(place) or not _sound(place):
+            raise InputError(f"{place}: not a journal", "a file that surefix live has written")
+        return Journal(create_engine(parsed))
     if place.exists() and not _sound(place):
         aside = f"{place.name}.damaged-{time.strftime('%Y%m%dT%H%M%S')}"
         for part in ("", "-wal", "-shm"):
@@ -321,6 +331,8 @@ def _sound(place: Path) -> bool:
     try:
         with engine.connect() as connection:
             return connection.exec_driver_sql("PRAGMA quick_check").scalar() == "ok"
+    except OperationalError:
+        return True  # locked, or not to be opened: that says nothing of what is in it
     except DatabaseError:
         return False
     finally:

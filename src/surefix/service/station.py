@@ -153,7 +153,10 @@ def latest(station: Station, time: float = math.nan) -> Latest | None:
     if station.session.setup is None:
         return None
     logs = [copy.deepcopy(stream).rest() for stream in station.streams]
-    batches = end_on_trial(station.session, [_with(logs[0], time), *logs[1:]])
+    roles = [inflow.role for inflow in station.session.merging.inflows]
+    first = roles.index("fixes")
+    logs[first] = _with(logs[first], time)
+    batches = end_on_trial(station.session, logs)
     return _last(batches, station.shown)
 
 
