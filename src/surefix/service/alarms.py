@@ -1,8 +1,8 @@
 """Alarms: raised when something becomes wrong, acknowledged by a person, cleared when it is right.
 
-The model is IMO MSC.252(83): an alarm stays until it is acknowledged and its cause is gone; one that
-is acknowledged stays visible while its cause lasts; one whose cause is gone stays until it has been
-acknowledged. A cause that comes back makes a new alarm.
+The model is IMO MSC.252(83): an alarm stays until it is acknowledged and its cause is gone; one
+that is acknowledged stays visible while its cause lasts; one whose cause is gone stays until it has
+been acknowledged. A cause that comes back makes a new alarm.
 """
 
 from __future__ import annotations
@@ -57,9 +57,10 @@ def raised(alarms: Alarms, concerns: str, priority: Priority, text: str, now: fl
     """Raise an alarm; one about the same whose cause lasts only takes the new words and urgency."""
     for k, each in enumerate(alarms):
         if each.concerns == concerns and math.isnan(each.gone):
+            known = each._replace(priority=priority, text=text)
             if each.priority != priority:  # more or less urgent: to be acknowledged again
-                each = each._replace(seen=math.nan, by="")
-            return (*alarms[:k], each._replace(priority=priority, text=text), *alarms[k + 1 :])
+                known = known._replace(seen=math.nan, by="")
+            return (*alarms[:k], known, *alarms[k + 1 :])
     number = max((each.number for each in alarms), default=0) + 1
     return (*alarms, Alarm(number, concerns, priority, text, now))
 
