@@ -28,6 +28,7 @@ from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
 
 _WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
+_NO_SERIES = "velocity_sigma_mps"  # what a sensor declares of its velocities is not one
 
 
 class Chunk(NamedTuple):
@@ -119,7 +120,8 @@ def merge(
     after = Merging(tuple(inflows), tuple(sensors))
     if log is None:
         return after, Chunk(rows, (), events, (), False)
-    channels = log.channels if inflow.role in _WITH_CHANNELS else ()
+    channels = tuple(each for each in log.channels if each.name != _NO_SERIES)
+    channels = channels if inflow.role in _WITH_CHANNELS else ()
     events = (*log.events, *events)
     return after, Chunk(rows, channels, events, log.problems, log.depth_positive_down)
 

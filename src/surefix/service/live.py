@@ -88,7 +88,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.role) for each in options.inputs])
+    journal.begin([(each.name, each.task) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -189,7 +189,7 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
 
 def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
-        return Epoch(known.time, known=False)
+        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
     latitude, longitude, height = known.geodetic
     east, north, _ = known.velocity
     sigma_east, sigma_north, sigma_up = known.sigma_position
@@ -203,6 +203,8 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
+        heading=known.heading,
+        depth=known.depth,
         known=known.time - known.observed <= _STALE,
     )
 

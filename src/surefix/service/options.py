@@ -60,6 +60,9 @@ class InputOptions:
         Networks that datagrams and clients may come from; empty: any.
     require_checksum
         False accepts sentences without one.
+    target
+        Of an acoustic positioning system: the transponder whose sightings are the fixes, or
+        ``first``, the one that is heard first; None, or ``ship``: the fixes are the receivers'.
     """
 
     name: str
@@ -67,6 +70,7 @@ class InputOptions:
     role: str = "fixes"
     allow: tuple[str, ...] = ()
     require_checksum: bool = True
+    target: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -80,6 +84,15 @@ class InputOptions:
                 raise OptionsError(f"allow {network!r} of {self.name}", "a network") from error
         if not isinstance(self.require_checksum, bool):
             raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
+        if self.target is not None and (not isinstance(self.target, str) or not self.target):
+            raise OptionsError(f"target {self.target!r}", "the name of a transponder, or first")
+        if self.target is not None and self.role != "fixes":
+            raise OptionsError(f"target of {self.name}, a source of {self.role}", "role fixes")
+
+    @property
+    def task(self) -> str:
+        """Its role and target, as the journal has them."""
+        return self.role if self.target is None else f"{self.role} of {self.target}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,13 +104,13 @@ class OutputOptions:
     address
         Where it goes to.
     sentences
-        Some of ``SENTENCES``.
+        Some of ``SENTENCES``; HDT and DPT go out where a heading, a depth is known.
     talker
         Two letters that the sentences begin with.
     """
 
     address: Address
-    sentences: tuple[str, ...] = ("GGA", "RMC", "VTG", "GST")
+    sentences: tuple[str, ...] = TYPES
     talker: str = "GP"
 
     def __post_init__(self) -> None:
@@ -193,7 +206,9 @@ def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any
 
 
 def _input(place: Path, table: dict[str, Any]) -> InputOptions:
-    rest = _known(place, "input", table, {"name", "from", "role", "allow", "require_checksum"})
+    rest = _known(
+        place, "input", table, {"name", "from", "role", "allow", "require_checksum", "target"}
+    )
     if "name" not in rest or "from" not in rest:
         raise OptionsError(f"{place}: an input without name or from", "both")
     where = address(str(rest.pop("from")), INPUTS)

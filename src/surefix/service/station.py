@@ -7,7 +7,6 @@ ones to be put before them. Both go through the very steps of `surefix clean`.
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
 from surefix.service.options import LiveOptions
+from surefix.service.series import FRESH, series_at, with_few_series
 from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
 __all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
@@ -40,6 +40,11 @@ class Latest(NamedTuple):
         (3,) latitude and longitude, deg, and height, m; None for a metric log.
     observed
         s, Unix, of the last fix that was used at least in part.
+    heading
+        deg, true; NaN if it is not known.
+    depth
+        m, positive down: of the vehicle where it has a depth sensor, else of the water; NaN if it
+        is not known.
     """
 
     time: float
@@ -49,6 +54,8 @@ class Latest(NamedTuple):
     sigma_velocity: FloatArray
     geodetic: FloatArray | None
     observed: float
+    heading: float = math.nan
+    depth: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,9 @@ class Station:
 def begin_station(options: LiveOptions) -> Station:
     """Begin with nothing received."""
     inputs = [(each.name, each.role) for each in options.inputs]
-    streams = tuple(NmeaStream(Path(each.name), each.require_checksum) for each in options.inputs)
+    streams = tuple(
+        NmeaStream(Path(each.name), each.require_checksum, each.target) for each in options.inputs
+    )
     return Station(begin_session(inputs, options.clean), streams)
 
 
@@ -125,7 +134,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
         if session.merging.inflows[piece.source].ended:
             continue
         if piece.source not in fresh:
-            streams[piece.source] = copy.deepcopy(streams[piece.source])
+            streams[piece.source] = streams[piece.source].copy()
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
@@ -152,12 +161,30 @@ def latest(station: Station, time: float = math.nan) -> Latest | None:
     """
     if station.session.setup is None:
         return None
-    logs = [copy.deepcopy(stream).rest() for stream in station.streams]
+    logs = [stream.copy().rest() for stream in station.streams]
     roles = [inflow.role for inflow in station.session.merging.inflows]
     first = roles.index("fixes")
     logs[first] = _with(logs[first], time)
-    batches = end_on_trial(station.session, logs)
-    return _last(batches, station.shown)
+    batches = end_on_trial(with_few_series(station.session), logs)
+    known = _last(batches, station.shown)
+    if known is None:
+        return None
+    told = series_at(known.time, batches, station.session.names, roles)
+    depth = told["depth_m"]
+    if _dives(station, known.time):
+        depth = -float(known.position[2] if known.geodetic is None else known.geodetic[2])
+    return known._replace(heading=told["heading_deg"], depth=depth)
+
+
+def _dives(station: Station, time: float) -> bool:
+    """Whether the height of the track is that of a depth sensor which is still heard."""
+    inflows = station.session.merging.inflows
+    heard = [
+        stream.newest
+        for stream, inflow in zip(station.streams, inflows, strict=True)
+        if inflow.role == "depth" or (station.session.has_depth and inflow.role == "fixes")
+    ]
+    return any(time - newest <= FRESH for newest in heard)
 
 
 def _with(log: Log, time: float) -> Log:
