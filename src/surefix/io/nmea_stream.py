@@ -146,7 +146,7 @@ class NmeaStream:
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
 
-        As long as there is no date, up to 500 rows wait for one.
+        As long as there is neither a date nor a time of reception, up to 500 rows wait for one.
 
         Parameters
         ----------
@@ -158,7 +158,8 @@ class NmeaStream:
         self._arrival, self._live = arrival, True
         self._framing, frames = frame(self._framing, data)
         self._read(frames)
-        if self._clock.dated or self.size >= _UNDATED:
+        received = not math.isnan(self._clock.receive)
+        if self._clock.dated or received or self.size >= _UNDATED:
             return self.chunk()
         return Log(source=str(self._path))
 

@@ -114,6 +114,8 @@ def merge(
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
     inflow, events = _order(inflow, fixes, options.reorder_s)
+    if log is not None and inflow.role == "heading":
+        inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     inflows = [*merging.inflows]
     inflows[source] = inflow
     inflows, rows = _release(inflows)
@@ -132,10 +134,15 @@ def _number(sensors: list[str], name: str) -> int:
     return sensors.index(name)
 
 
+def _reached(log: Log, before: float) -> float:
+    """How far an input of headings has come, s: it has no rows that would tell."""
+    return max((float(np.nanmax(c.time, initial=before)) for c in log.channels), default=before)
+
+
 def _supporting(log: Log, role: str) -> Fixes | None:
     """The fixes of a log; a depth series becomes observations of the height alone."""
     if role != "depth":
-        return log.fixes
+        return None if role == "heading" else log.fixes
     series = [c for c in log.channels if c.name == "depth_m"]
     if not series:
         return None
