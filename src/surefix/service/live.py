@@ -96,7 +96,15 @@ def begin_live(options: LiveOptions) -> Live:
         station, _ = receive(station, [piece])
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
+    for source, size in _replayed(options, journal).items():
+        lines[source].size = size
     return Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+
+
+def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
+    """How much of the recorded logs is in the journal already, bytes: they go on from there."""
+    logs = {i for i, each in enumerate(options.inputs) if each.address.kind == "file"}
+    return {i: size for i, size in journal.sizes().items() if i in logs} if logs else {}
 
 
 async def run_live(
