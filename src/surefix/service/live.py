@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -24,6 +25,7 @@ from surefix.service.inputs import Line, listen
 from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.recorder import Recorder
 from surefix.service.station import (
     Latest,
     Station,
@@ -53,7 +55,7 @@ class Live:
         Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
-    lines, outputs
+    lines, outputs, recorders
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
@@ -67,6 +69,7 @@ class Live:
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
+    recorders: list[Recorder] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
@@ -92,13 +95,21 @@ def begin_live(options: LiveOptions) -> Live:
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
+    files = [each.address.path for each in options.outputs if each.address.kind == "file"]
+    recorders = [Recorder(Path(path), station.rows) for path in files]
     for piece in journal.received(station.after):
-        station, _ = receive(station, [piece])
+        station, batches = receive(station, [piece])
+        for recorder in recorders:
+            recorder.add(batches)
+    for recorder in recorders:
+        recorder.ready()
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
     for source, size in _replayed(options, journal).items():
         lines[source].size = size
-    return Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live.recorders = recorders
+    return live
 
 
 def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
@@ -120,7 +131,9 @@ async def run_live(
     inbox = Inbox()
     try:
         for wanted in live.options.outputs:
-            live.outputs.append((wanted, await open_output(wanted.address)))
+            if wanted.address.kind != "file":
+                live.outputs.append((wanted, await open_output(wanted.address)))
+        await _write(live, _gaps(live))
         async with asyncio.TaskGroup() as tasks:
             reading = [
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
@@ -139,6 +152,8 @@ async def run_live(
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
+        for recorder in live.recorders:
+            recorder.close()
 
 
 async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
@@ -148,6 +163,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         live.taken += 1
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
+    for recorder in live.recorders:
+        recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
@@ -161,6 +178,15 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     await _write(live, [*received, *told])
     for output, text in fresh:
         output.send(text)
+
+
+def _gaps(live: Live) -> list[Told]:
+    """Say of each recorded track which rows it will never have."""
+    return [
+        _told(live, math.nan, "event", f"note: {each.place} lacks {each.missing} rows before these")
+        for each in live.recorders
+        if each.missing
+    ]
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
@@ -243,6 +269,8 @@ async def _write(
 
         def snapshot() -> tuple[int, bytes]:
             live.stored_at = time.monotonic()
+            for recorder in live.recorders:  # a snapshot knows of no row that is not recorded
+                recorder.flush()
             return live.station.after, stored(live.station)
 
     keeper = live.keeper

@@ -16,6 +16,9 @@
     sentences = ["GGA", "RMC", "VTG", "GST"]
     talker = "GP"
 
+    [[output]]
+    to = "file:track.csv"             # the clean track, recorded; or .parquet
+
     [journal]
     url = "sqlite:///mission.db"
 """
@@ -221,7 +224,12 @@ def _output(place: Path, table: dict[str, Any]) -> OutputOptions:
     rest = _known(place, "output", table, {"to", "sentences", "talker"})
     if "to" not in rest:
         raise OptionsError(f"{place}: an output without to", "an address")
-    return OutputOptions(address=address(str(rest.pop("to")), OUTPUTS), **rest)
+    where = address(str(rest.pop("to")), OUTPUTS)
+    if where.kind == "file":
+        if rest:
+            raise OptionsError(f"{place}: {min(rest)!r} of a recorded track", "only to")
+        where = where._replace(path=str(place.parent / where.path))
+    return OutputOptions(address=where, **rest)
 
 
 def _known(place: Path, name: str, table: dict[str, Any], keys: set[str]) -> dict[str, Any]:

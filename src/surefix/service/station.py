@@ -20,9 +20,10 @@ from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
+from surefix.service.delays import with_delays
 from surefix.service.options import LiveOptions
 from surefix.service.series import FRESH, series_at, with_few_series
-from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
+from surefix.types import Channel, Cleaned, Fixes, FloatArray, Log, Verdict
 
 __all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
 
@@ -72,12 +73,19 @@ class Station:
         Number of the last bytes taken.
     shown
         Where the vehicle was at the last row that is cleaned for good; None before.
+    rows
+        How many rows are cleaned for good.
+    delays
+        By sensor: when observations of the last minute were received, and how long after they were
+        valid, s.
     """
 
     session: Session
     streams: tuple[NmeaStream, ...]
     after: int = 0
     shown: Latest | None = None
+    rows: int = 0
+    delays: tuple[Channel, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
@@ -96,12 +104,15 @@ class _Stored(NamedTuple):
     streams: tuple[Mapping[str, object], ...]
     after: int
     shown: Latest | None
+    rows: int
+    delays: tuple[Channel, ...]
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    return snapshot(_Stored(station.session, states, station.after, station.shown))
+    rest = station.after, station.shown, station.rows, station.delays
+    return snapshot(_Stored(station.session, states, *rest))
 
 
 def resumed(options: LiveOptions, content: bytes) -> Station:
@@ -116,7 +127,7 @@ def resumed(options: LiveOptions, content: bytes) -> Station:
     streams = begin_station(options).streams
     for stream, state in zip(streams, known.streams, strict=True):
         stream.resume(state)
-    return Station(known.session, streams, known.after, known.shown)
+    return Station(known.session, streams, *known[2:])
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
@@ -130,6 +141,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     session, streams = station.session, [*station.streams]
     batches: list[Cleaned] = []
     fresh: set[int] = set()
+    delays = station.delays
     for piece in received:
         if session.merging.inflows[piece.source].ended:
             continue
@@ -138,6 +150,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
+        delays = with_delays(delays, log.delays)
         session, done = advance(session, piece.source, log)
         batches += done
         if not piece.data:
@@ -145,7 +158,8 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             batches += done
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
-    return Station(session, tuple(streams), after, shown), tuple(batches)
+    rows = station.rows + sum(len(batch.track.time) for batch in batches)
+    return Station(session, tuple(streams), after, shown, rows, delays), tuple(batches)
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
