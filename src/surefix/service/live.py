@@ -30,6 +30,7 @@ from surefix.service.station import (
     Latest,
     Station,
     begin_station,
+    begun,
     latest,
     receive,
     resumed,
@@ -76,6 +77,7 @@ class Live:
     alarms: dict[str, str] = field(default_factory=dict)
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    begun: int = 0
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -191,7 +193,9 @@ def _gaps(live: Live) -> list[Told]:
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
     """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick."""
-    known = latest(live.station) if fresh else None
+    news = begun(live.station)
+    known = latest(live.station) if fresh and news != live.begun else None
+    live.begun = news
     behind = live.now is not None and (known is None or known.time <= live.now.time)
     if not behind or now - live.shown_at < _TICK or _recorded(live):
         return known

@@ -25,7 +25,7 @@ from surefix.service.options import LiveOptions
 from surefix.service.series import FRESH, series_at, with_few_series
 from surefix.types import Channel, Cleaned, Fixes, FloatArray, Log, Verdict
 
-__all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
+__all__ = ["Latest", "Station", "begin_station", "begun", "latest", "receive", "resumed", "stored"]
 
 
 class Latest(NamedTuple):
@@ -160,6 +160,13 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     shown = _last(batches, station.shown)
     rows = station.rows + sum(len(batch.track.time) for batch in batches)
     return Station(session, tuple(streams), after, shown, rows, delays), tuple(batches)
+
+
+def begun(station: Station) -> int:
+    """How many fixes were begun to be read, of all inputs: more of them make a newer position."""
+    inflows = station.session.merging.inflows
+    pairs = zip(station.streams, inflows, strict=True)
+    return sum(stream.count for stream, inflow in pairs if inflow.role == "fixes")
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
