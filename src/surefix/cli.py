@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +29,7 @@ from surefix.cli_inputs import (
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_signals import obey
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
@@ -44,7 +44,6 @@ app = typer.Typer(
 )
 
 _INTERRUPTED = 130
-_TERMINATED = 143
 _SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
@@ -297,7 +296,7 @@ app.command()(warmup)
 def main() -> None:
     """Run the command line; every failure ends with one line and a non-zero exit."""
     _use_utf8()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))  # unfinished files are removed
+    obey()
     try:
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:
