@@ -47,7 +47,12 @@ _INTERRUPTED = 130
 _SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
-    list[Path], typer.Argument(help="Logs: CSV, Parquet or NMEA 0183.", show_default=False)
+    list[str],
+    typer.Argument(
+        help="Logs: CSV, Parquet, NMEA 0183, or the journal of a live service, a file or a URL.",
+        show_default=False,
+        metavar="INPUTS...",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
@@ -187,7 +192,8 @@ def clean(
         _delays(sensor_delay or []),
     )
     check_report(report)
-    files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
+    given = (*inputs, depth, velocity, heading, options)
+    files = [Path(path) for path in given if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
@@ -226,7 +232,7 @@ def info(
     from surefix.io.columns import mapping
     from surefix.pipelines.info import describe, info_lines
 
-    files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
+    files = [Path(path) for path in (*inputs, depth, velocity, heading) if path is not None]
     with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,

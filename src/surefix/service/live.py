@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -20,6 +21,7 @@ from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
+from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
 from surefix.service.station import (
@@ -37,7 +39,6 @@ __all__ = ["Live", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
 _STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
-_KEPT: Final = 64 << 20  # bytes that are kept for a journal that cannot be written
 
 
 @dataclass
@@ -48,32 +49,27 @@ class Live:
     ----------
     options
         What it does.
-    journal
-        Where it is written.
+    journal, keeper
+        Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
     lines, outputs
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
-    unwritten
-        Received and told things that the journal has not got yet.
-    lost
-        Bytes that it will never get: they are a gap of the mission.
     alarms
         What is wrong at present, by what it concerns.
     """
 
     options: LiveOptions
     journal: Journal
+    keeper: Keeper
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
-    unwritten: list[Received | Told] = field(default_factory=list)
-    lost: int = 0
     alarms: dict[str, str] = field(default_factory=dict)
     stored_at: float = -math.inf
     shown_at: float = -math.inf
@@ -100,7 +96,15 @@ def begin_live(options: LiveOptions) -> Live:
         station, _ = receive(station, [piece])
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
-    return Live(options, journal, station, lines, taken=taken, said=said)
+    for source, size in _replayed(options, journal).items():
+        lines[source].size = size
+    return Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+
+
+def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
+    """How much of the recorded logs is in the journal already, bytes: they go on from there."""
+    logs = {i for i, each in enumerate(options.inputs) if each.address.kind == "file"}
+    return {i: size for i, size in journal.sizes().items() if i in logs} if logs else {}
 
 
 async def run_live(
@@ -124,7 +128,7 @@ async def run_live(
             ]
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
-                _noticed(live, inbox)
+                await _write(live, _noticed(live, inbox))
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
@@ -154,8 +158,7 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
             text = sentences(epoch, talker=wanted.talker, types=wanted.sentences)
             told.append(_told(live, known.time, "nmea", text.decode("ascii")))
             fresh.append((output, text))
-    live.unwritten += [*received, *told]
-    await _write(live)
+    await _write(live, [*received, *told])
     for output, text in fresh:
         output.send(text)
 
@@ -219,48 +222,39 @@ async def _next(inbox: Inbox, stop: asyncio.Event) -> list[Arrived]:
     return taking.result() if taking in done else []
 
 
-def _noticed(live: Live, inbox: Inbox) -> None:
+def _noticed(live: Live, inbox: Inbox) -> list[Told]:
     """Say that more came than could be taken."""
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
         live.alarms["load"], inbox.shed = text, 0
+        return [_told(live, math.nan, "alarm", text)]
+    return []
 
 
-async def _write(live: Live, *, whole: bool = False) -> None:
+async def _write(
+    live: Live, records: Sequence[Received | Told] = (), *, whole: bool = False
+) -> None:
     """Write what is not written yet, and a snapshot if it is time; without success, keep it."""
-    snapshot = None
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
-    if live.station.session.setup is not None and (whole or due):
-        snapshot = live.station.after, stored(live.station)
-    received = [each for each in live.unwritten if isinstance(each, Received)]
-    told = [each for each in live.unwritten if isinstance(each, Told)]
-    if not received and not told and not whole:
-        return
-    try:
-        await asyncio.to_thread(live.journal.write, received, told, snapshot)
-    except OutputError as error:
-        if "journal" not in live.alarms:
-            live.alarms["journal"] = str(error)
-        _spare(live)
-        return
-    if snapshot is not None:
-        live.stored_at = time.monotonic()
-    live.unwritten.clear()
-    if live.alarms.pop("journal", None) is not None and live.lost:
-        text = f"the journal was away: {live.lost} bytes of the mission are not in it"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
-        live.lost = 0
+    snapshot = None
+    if live.station.session.setup is not None and (whole or (due and records)):
+
+        def snapshot() -> tuple[int, bytes]:
+            live.stored_at = time.monotonic()
+            return live.station.after, stored(live.station)
+
+    keeper = live.keeper
+    if await keeper.keep(records, snapshot, last=whole):
+        if live.alarms.pop("journal", None) is not None and keeper.gap.pieces:
+            gap, keeper.gap = keeper.gap, Gap()
+            await keeper.keep([_told(live, math.nan, "alarm", _missing(gap))], last=whole)
+    else:
+        live.alarms["journal"] = keeper.trouble
 
 
-def _spare(live: Live) -> None:
-    """Keep no more than there is room for: the oldest goes, and is counted."""
-    size = sum(_size(each) for each in live.unwritten)
-    while size > _KEPT:
-        gone = live.unwritten.pop(0)
-        size -= _size(gone)
-        live.lost += _size(gone)
-
-
-def _size(each: Received | Told) -> int:
-    return len(each.data) if isinstance(each, Received) else len(each.text)
+def _missing(gap: Gap) -> str:
+    text = f"the journal was away: {gap.size} bytes of the mission are not in it"
+    if math.isnan(gap.first):
+        return text
+    first, last = (f"{datetime.fromtimestamp(at, UTC):%Y-%m-%dT%H:%M:%SZ}" for at in gap[2:])
+    return f"{text}, of {first} to {last}"

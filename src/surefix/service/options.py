@@ -73,7 +73,7 @@ class InputOptions:
             raise OptionsError(f"input name {self.name!r}", "a name")
         if self.role not in _ROLES:
             raise OptionsError(f"role {self.role!r} of {self.name}", "one of " + ", ".join(_ROLES))
-        for network in self.allow:
+        for network in _texts("allow", self.allow):
             try:
                 ipaddress.ip_network(network, strict=False)
             except ValueError as error:
@@ -101,7 +101,7 @@ class OutputOptions:
     talker: str = "GP"
 
     def __post_init__(self) -> None:
-        for name in self.sentences:
+        for name in _texts("sentences", self.sentences):
             if name not in SENTENCES:
                 raise OptionsError(f"sentence {name!r}", "one of " + ", ".join(SENTENCES))
         if not isinstance(self.talker, str) or not _TALKER.fullmatch(self.talker):
@@ -170,6 +170,12 @@ def read_live(path: str | Path) -> LiveOptions:
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
+
+
+def _texts(name: str, values: object) -> tuple[str, ...]:
+    if isinstance(values, tuple) and all(isinstance(each, str) for each in values):
+        return values
+    raise OptionsError(f"{name} = {values!r}", 'a list of texts, as ["…"]')
 
 
 def _beside(place: Path, url: str) -> str:
