@@ -1,6 +1,7 @@
 """The whole service: what comes in at one end comes out clean at the other, and stays known."""
 
 import asyncio
+import json
 import math
 import os
 import re
@@ -157,6 +158,11 @@ def test_stopped_by_a_signal_it_ends_in_order(tmp_path):
     live.journal.close()
 
 
+def concerned(live, what):
+    """Whether an alarm about it lasts."""
+    return any(each.concerns == what and math.isnan(each.gone) for each in live.alarms)
+
+
 def fed(live, failing, monkeypatch):
     """Feed a log sentence by sentence to a service whose journal cannot write some of the times."""
     write, calls = live.journal.write, []
@@ -173,7 +179,7 @@ def fed(live, failing, monkeypatch):
     async def run():
         for line in recorded().splitlines(keepends=True):
             await step(live, [Arrived(0, math.nan, line)], 0.0)
-            seen.append(("journal" in live.alarms, live.now))
+            seen.append((concerned(live, "journal"), live.now))
         await step(live, [], 0.0)
 
     asyncio.run(run())
@@ -185,7 +191,7 @@ def test_it_goes_on_while_the_journal_cannot_be_written(tmp_path, monkeypatch):
     options = read_live(options_in(tmp_path, f"udp://127.0.0.1:{free_port()}", target))
     live = begin_live(options)
     seen = fed(live, lambda n: 300 < n < 330, monkeypatch)
-    assert "journal" not in live.alarms
+    assert not concerned(live, "journal")
     during = [now.time for alarmed, now in seen if alarmed]
     assert len(during) == 29
     assert during[-1] > during[0] + 5.0  # positions went on
@@ -201,11 +207,12 @@ def test_what_a_journal_never_gets_is_a_gap_that_is_told(tmp_path, monkeypatch):
     live = begin_live(options)
     monkeypatch.setattr(service, "_KEPT", 1000)
     fed(live, lambda n: 100 < n < 200, monkeypatch)
-    alarms = [each.text for each in live.journal.told() if each.kind == "alarm"]
-    (said,) = [text for text in alarms if "bytes of the mission are not in it" in text]
+    alarms = [json.loads(each.text) for each in live.journal.told("alarm")]
+    (said,) = [each["text"] for each in alarms if each["concerns"] == "mission"]
+    assert "bytes of the mission are not in it" in said
     numbers = [piece.number for piece in live.journal.received()]
     assert 0 < live.taken - len(numbers) < 100
-    assert int(said.split()[4]) > 0
+    assert int(said.split()[5]) > 0
     live.journal.close()
 
 

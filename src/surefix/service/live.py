@@ -18,22 +18,29 @@ from typing import Final
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
+from surefix.service import alarms as alarm
+from surefix.service.alarms import Alarm
+from surefix.service.causes import Condition, causes
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
+from surefix.service.judgement import judge_sensors
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.sensors import SensorState
 from surefix.service.station import (
+    Ahead,
     Latest,
     Station,
     begin_station,
-    latest,
+    look_ahead,
     receive,
     resumed,
     stored,
 )
+from surefix.service.steady import SteadyClock
 from surefix.types import Cleaned
 
-__all__ = ["Live", "begin_live", "run_live", "step"]
+__all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
 _STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
@@ -60,8 +67,14 @@ class Live:
         Received and told things that the journal has not got yet.
     lost
         Bytes that it will never get: they are a gap of the mission.
+    sensors
+        How each is judged.
     alarms
-        What is wrong at present, by what it concerns.
+        Those that are open, and those that were closed not long ago.
+    trouble
+        Why the journal cannot be written; empty if it can.
+    set_by
+        s by which the computer's clock was set since the service began.
     """
 
     options: LiveOptions
@@ -74,9 +87,15 @@ class Live:
     said: int = 0
     unwritten: list[Received | Told] = field(default_factory=list)
     lost: int = 0
-    alarms: dict[str, str] = field(default_factory=dict)
+    sensors: tuple[SensorState, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
+    trouble: str = ""
+    set_by: float = 0.0
+    ahead: Ahead | None = None
+    fixed_at: tuple[float, float] = (math.nan, math.nan)  # validity of the last row, and when seen
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    shed_at: float = -math.inf
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -100,20 +119,24 @@ def begin_live(options: LiveOptions) -> Live:
         station, _ = receive(station, [piece])
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
-    return Live(options, journal, station, lines, taken=taken, said=said)
+    known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
+    return Live(options, journal, station, lines, taken=taken, said=said, alarms=known)
 
 
 async def run_live(
-    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] = time.time
+    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] | None = None
 ) -> None:
     """Serve until ``stop`` is set, or all inputs are recorded logs that have ended.
+
+    Without a ``clock`` it is one that does not step when the computer's clock is set.
 
     Raises
     ------
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox = Inbox()
+    inbox, steady = Inbox(), SteadyClock()
+    clock = clock or steady
     try:
         for wanted in live.options.outputs:
             live.outputs.append((wanted, await open_output(wanted.address)))
@@ -124,14 +147,15 @@ async def run_live(
             ]
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
-                _noticed(live, inbox)
+                _noticed(live, inbox, clock())
+                live.set_by = steady.set_by if clock is steady else 0.0
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
-        await _write(live, whole=True)
+        await _write(live, clock(), whole=True)
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
@@ -155,18 +179,76 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
             told.append(_told(live, known.time, "nmea", text.decode("ascii")))
             fresh.append((output, text))
     live.unwritten += [*received, *told]
-    await _write(live)
+    _judge(live, now)
+    trouble = live.trouble
+    await _write(live, now)
+    if live.trouble != trouble:
+        _heed(live, now)
     for output, text in fresh:
         output.send(text)
 
 
+def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
+    """Tell that a person has seen an alarm; False if there is none of that number to be seen.
+
+    The journal has it with the next step, a second later at most.
+
+    Parameters
+    ----------
+    live
+        The service.
+    number
+        Of the alarm.
+    by
+        Who has seen it.
+    now
+        s, Unix.
+    """
+    before = live.alarms
+    _set_alarms(live, alarm.acknowledged(before, number, by, now), now)
+    return live.alarms != before
+
+
+def _judge(live: Live, now: float) -> None:
+    """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
+    session = live.station.session if live.ahead is None else live.ahead.session
+    inputs = [(each.name, each.role) for each in live.options.inputs]
+    at = math.nan if _recorded(live) else now
+    live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
+    _heed(live, now)
+
+
+def _heed(live: Live, now: float) -> None:
+    """Raise alarms for what is wrong, and clear those whose cause is gone."""
+    condition = Condition(now, live.now, live.trouble, live.shed_at, live.set_by)
+    found = causes(live.sensors, condition, live.options.alarms)
+    _set_alarms(live, alarm.up_to_date(live.alarms, found, now), now)
+
+
+def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
+    """Take over alarms, and tell the journal of those that are not what they were."""
+    for each in alarm.changed(live.alarms, after):
+        live.unwritten.append(_told(live, now, "alarm", alarm.as_text(each)))
+    live.alarms = after
+
+
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
-    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick."""
-    known = latest(live.station) if fresh else None
+    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick.
+
+    Dead reckoning goes on from the last row by the time that has passed since it was seen, so that
+    a clock of this computer that is wrong does no harm.
+    """
+    known = None
+    if fresh:
+        live.ahead = look_ahead(live.station)
+        known = live.ahead.shown
+    if known is not None and not known.time <= live.fixed_at[0]:
+        live.fixed_at = known.time, now
     behind = live.now is not None and (known is None or known.time <= live.now.time)
     if not behind or now - live.shown_at < _TICK or _recorded(live):
         return known
-    return latest(live.station, now)
+    newest, seen = live.fixed_at
+    return look_ahead(live.station, newest + now - seen).shown
 
 
 def _recorded(live: Live) -> bool:
@@ -219,20 +301,21 @@ async def _next(inbox: Inbox, stop: asyncio.Event) -> list[Arrived]:
     return taking.result() if taking in done else []
 
 
-def _noticed(live: Live, inbox: Inbox) -> None:
+def _noticed(live: Live, inbox: Inbox, now: float) -> None:
     """Say that more came than could be taken."""
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
-        live.alarms["load"], inbox.shed = text, 0
+        live.unwritten.append(_told(live, now, "event", f"overload: {text}"))
+        live.shed_at, inbox.shed = now, 0
 
 
-async def _write(live: Live, *, whole: bool = False) -> None:
+async def _write(live: Live, now: float, *, whole: bool = False) -> None:
     """Write what is not written yet, and a snapshot if it is time; without success, keep it."""
     snapshot = None
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
     if live.station.session.setup is not None and (whole or due):
         snapshot = live.station.after, stored(live.station)
+    count = len(live.unwritten)
     received = [each for each in live.unwritten if isinstance(each, Received)]
     told = [each for each in live.unwritten if isinstance(each, Told)]
     if not received and not told and not whole:
@@ -240,17 +323,18 @@ async def _write(live: Live, *, whole: bool = False) -> None:
     try:
         await asyncio.to_thread(live.journal.write, received, told, snapshot)
     except OutputError as error:
-        if "journal" not in live.alarms:
-            live.alarms["journal"] = str(error)
+        live.trouble = live.trouble or str(error)
         _spare(live)
         return
     if snapshot is not None:
         live.stored_at = time.monotonic()
-    live.unwritten.clear()
-    if live.alarms.pop("journal", None) is not None and live.lost:
-        text = f"the journal was away: {live.lost} bytes of the mission are not in it"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
+    del live.unwritten[:count]  # an alarm may have been acknowledged meanwhile
+    if live.trouble and live.lost:
+        text = f"gap: the journal was away, {live.lost} bytes of the mission are not in it"
+        known = alarm.raised(live.alarms, "mission", "warning", text, now)
+        _set_alarms(live, alarm.cleared(known, "mission", now), now)
         live.lost = 0
+    live.trouble = ""
 
 
 def _spare(live: Live) -> None:
