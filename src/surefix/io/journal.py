@@ -169,10 +169,11 @@ class Journal:
                 return
             after = int(rows[-1][0])
 
-    def told(self) -> list[Told]:
-        """Give what was put out, in its order."""
+    def told(self, kind: str | None = None) -> list[Told]:
+        """Give what was put out, in its order; only that of a ``kind``, if one is named."""
+        query = select(_TOLD).order_by(_TOLD.c.number)
         with self._place.reading() as connection:
-            rows = connection.execute(select(_TOLD).order_by(_TOLD.c.number))
+            rows = connection.execute(query if kind is None else query.where(_TOLD.c.kind == kind))
             return [Told(n, after, _time(at), *words) for n, after, at, *words in rows]
 
     def sources(self) -> list[tuple[str, str]]:

@@ -18,6 +18,10 @@
 
     [journal]
     url = "sqlite:///mission.db"
+
+    [alarms]
+    position_sigma_m = 10.0           # σ above which the position is called uncertain
+    dead_reckoning_s = 10.0           # time without a fix after which it is called lost
 """
 
 from __future__ import annotations
@@ -35,7 +39,7 @@ from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
 
-__all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
+__all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
 SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
@@ -109,6 +113,30 @@ class OutputOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class AlarmOptions:
+    """When the position is no longer to be relied on.
+
+    Parameters
+    ----------
+    position_sigma_m
+        Horizontal standard deviation above which it is uncertain, m.
+    dead_reckoning_s
+        Time without a fix that was used, s, after which it is lost. The default is the time within
+        which IMO A.1046(27) wants to be warned.
+    """
+
+    position_sigma_m: float = 10.0
+    dead_reckoning_s: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("position_sigma_m", "dead_reckoning_s"):
+            value = getattr(self, name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not value > 0.0:
+                raise OptionsError(f"{name} = {value!r}", "a number above 0")
+
+
+@dataclass(frozen=True, kw_only=True)
 class LiveOptions:
     """What the live service does.
 
@@ -122,6 +150,8 @@ class LiveOptions:
         URL of the journal.
     snapshot_s
         Time between two snapshots, s.
+    alarms
+        When alarms are raised.
     """
 
     clean: CleanOptions
@@ -129,6 +159,7 @@ class LiveOptions:
     outputs: tuple[OutputOptions, ...] = ()
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
+    alarms: AlarmOptions = AlarmOptions()
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -162,12 +193,14 @@ def read_live(path: str | Path) -> LiveOptions:
     if given.setdefault("mode", "realtime") != "realtime":
         raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
     journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    alarms = _table(place, content, "alarms", {"position_sigma_m", "dead_reckoning_s"})
     if (url := journal.get("url")) is not None:
         journal["url"] = _beside(place, str(url))
     return LiveOptions(
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
+        alarms=AlarmOptions(**alarms),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
 
