@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -28,6 +29,7 @@ from surefix.service.judgement import judge_sensors
 from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.recorder import Recorder
 from surefix.service.sensors import SensorState
 from surefix.service.station import (
     Ahead,
@@ -60,7 +62,7 @@ class Live:
         Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
-    lines, outputs
+    lines, outputs, recorders
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
@@ -80,6 +82,7 @@ class Live:
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
+    recorders: list[Recorder] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
@@ -103,7 +106,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.role) for each in options.inputs])
+    journal.begin([(each.name, each.task) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -111,15 +114,22 @@ def begin_live(options: LiveOptions) -> Live:
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
+    files = [each.address.path for each in options.outputs if each.address.kind == "file"]
+    recorders = [Recorder(Path(path), station.rows) for path in files]
     for piece in journal.received(station.after):
-        station, _ = receive(station, [piece])
+        station, batches = receive(station, [piece])
+        for recorder in recorders:
+            recorder.add(batches)
+    for recorder in recorders:
+        recorder.ready()
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
     for source, size in _replayed(options, journal).items():
         lines[source].size = size
     known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
-    keeper = Keeper(journal)
-    return Live(options, journal, keeper, station, lines, taken=taken, said=said, alarms=known)
+    live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live.recorders, live.alarms = recorders, known
+    return live
 
 
 def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
@@ -144,7 +154,9 @@ async def run_live(
     clock = clock or steady
     try:
         for wanted in live.options.outputs:
-            live.outputs.append((wanted, await open_output(wanted.address)))
+            if wanted.address.kind != "file":
+                live.outputs.append((wanted, await open_output(wanted.address)))
+        _gaps(live)
         async with asyncio.TaskGroup() as tasks:
             reading = [
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
@@ -164,6 +176,8 @@ async def run_live(
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
+        for recorder in live.recorders:
+            recorder.close()
 
 
 async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
@@ -173,6 +187,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         live.taken += 1
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
+    for recorder in live.recorders:
+        recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
@@ -237,6 +253,14 @@ def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
     live.alarms = after
 
 
+def _gaps(live: Live) -> None:
+    """Say of each recorded track which rows it will never have."""
+    for each in live.recorders:
+        if each.missing:
+            text = f"note: {each.place} lacks {each.missing} rows before these"
+            live.unwritten.append(_told(live, math.nan, "event", text))
+
+
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
     """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick.
 
@@ -276,7 +300,7 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
 
 def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
-        return Epoch(known.time, known=False)
+        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
     latitude, longitude, height = known.geodetic
     east, north, _ = known.velocity
     sigma_east, sigma_north, sigma_up = known.sigma_position
@@ -290,6 +314,8 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
+        heading=known.heading,
+        depth=known.depth,
         known=known.time - known.observed <= _STALE,
     )
 
@@ -324,6 +350,8 @@ async def _write(live: Live, now: float, *, whole: bool = False) -> None:
 
         def snapshot() -> tuple[int, bytes]:
             live.stored_at = time.monotonic()
+            for recorder in live.recorders:  # a snapshot knows of no row that is not recorded
+                recorder.flush()
             return live.station.after, stored(live.station)
 
     if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:
