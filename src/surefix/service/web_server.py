@@ -89,6 +89,7 @@ class Web:
             await self._server.serve([self._socket])
         finally:
             publishing.cancel()
+            await asyncio.gather(publishing, return_exceptions=True)
             for connection in list(self._server.server_state.connections):
                 connection.transport.abort()
             self._socket.close()
