@@ -38,6 +38,7 @@ class Served:
 
     def __init__(self, options):
         self.options, self.now = options, NOON
+        self._clients = []
         self.loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=[self._run()])
@@ -57,6 +58,8 @@ class Served:
         self._ready.wait(30.0)
 
     def stop(self):
+        for client in self._clients:
+            client.close()
         self.call(self._stop())
         self._thread.join(30.0)
         assert not self._thread.is_alive()
@@ -92,7 +95,9 @@ class Served:
     def client(self, token=None, **headers):
         """A client of the API."""
         shown = {"Authorization": f"Bearer {token}"} if token else {}
-        return httpx.Client(base_url=f"http://{self.host}", headers=shown | headers, timeout=30.0)
+        made = httpx.Client(base_url=f"http://{self.host}", headers=shown | headers, timeout=30.0)
+        self._clients.append(made)
+        return made
 
 
 def web_options(folder, more="", address="127.0.0.1:0"):

@@ -125,6 +125,7 @@ def open_web(live: Live, options: WebOptions, clock: Callable[[], float] = time.
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(place)
+        listening.listen()
     except OSError as error:
         listening.close()
         raise _refused(options, error) from error
