@@ -65,7 +65,8 @@ def test_the_past_is_what_was_cleaned(service):
     assert [whole["first"], whole["last"]] == [rows["time"][0], rows["time"][-1]]
     since, until = float(rows["time"][20]), float(rows["time"][60])
     part = client.get("/api/track", params={"since": since, "until": until, "most": 20}).json()
-    kept, total = part["rows"]["number"], int(((rows["time"] >= since) & (rows["time"] <= until)).sum())
+    kept = part["rows"]["number"]
+    total = int(((rows["time"] >= since) & (rows["time"] <= until)).sum())
     assert 2 <= len(kept) < total == len(kept) + part["rows"]["omitted"]
     assert min(part["rows"]["time"]) >= since
     assert max(part["rows"]["time"]) <= until
@@ -96,10 +97,10 @@ def test_what_a_client_says_ends_its_stream(service):
     with listen(f"ws://{service.host}/api/live") as stream:
         stream.recv(10.0)
         stream.send("hello")
-        with pytest.raises(websockets.ConnectionClosed) as closed:
+        with contextlib.suppress(websockets.ConnectionClosed):
             while True:
                 stream.recv(10.0)
-        assert closed.value.rcvd.code == 1003
+        assert stream.close_code == 1003
 
 
 @pytest.mark.parametrize(

@@ -126,8 +126,9 @@ def test_options_that_are_wrong_are_told(tmp_path, more, address, said):
 @pytest.mark.parametrize(
     ("host", "known"),
     [
-        ("127.0.0.1:8000", True), ("localhost:8000", True), ("LOCALHOST", True), ("[::1]:8000", True),
-        ("192.168.1.7", True), ("boat.example:8443", True), ("boat.example", True),
+        ("127.0.0.1:8000", True), ("localhost:8000", True), ("LOCALHOST", True),
+        ("[::1]:8000", True), ("192.168.1.7", True), ("boat.example:8443", True),
+        ("boat.example", True),
         ("evil.example", False), ("localhost.evil.example:8000", False), ("", False),
         ("127.0.0.1.evil.example", False), ("[::1", False), ("boat.example@evil.example", False),
     ],
@@ -140,9 +141,10 @@ def test_hosts(host, known):
 @pytest.mark.parametrize(
     ("origin", "known"),
     [
-        ("http://127.0.0.1:8000", True), ("https://boat.example", True), ("null", False), ("", False),
-        ("http://127.0.0.1:8001", False), ("http://127.0.0.1", False), ("http://boat.example", False),
-        ("https://boat.example.evil.example", False), ("file://127.0.0.1:8000", False),
+        ("http://127.0.0.1:8000", True), ("https://boat.example", True), ("null", False),
+        ("", False), ("http://127.0.0.1:8001", False), ("http://127.0.0.1", False),
+        ("http://boat.example", False), ("https://boat.example.evil.example", False),
+        ("file://127.0.0.1:8000", False),
         ("http://evil.example", False),
     ],
 )  # fmt: skip

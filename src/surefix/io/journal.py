@@ -107,7 +107,7 @@ class Told(NamedTuple):
     time
         s, Unix, of validity.
     kind, text
-        ``nmea``, ``rows`` (see `surefix.service.history`), ``event`` or ``alarm``, and what was said.
+        ``nmea``, ``rows`` (of the track, packed), ``event`` or ``alarm``, and what was said.
     """
 
     number: int

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import math
 import socket
 import time
@@ -29,6 +30,7 @@ __all__ = ["Web", "open_web"]
 
 _REQUEST: Final = 5.0  # s to send a whole request head
 _HEAD: Final = 16_384  # bytes of it
+_UNREAD: Final = 1 << 17  # bytes that the system keeps for a client that does not read
 _END: Final = 1.0  # s to take the last answers
 
 
@@ -76,6 +78,9 @@ class Web:
             ws_per_message_deflate=False,
         )
         self._server = _Server(config)
+        log = logging.getLogger("uvicorn.error")
+        log.setLevel(logging.ERROR)  # what is wrong with a request is said in its answer
+        log.addFilter(_is_error)
 
     def notice(self, arrived: Sequence[Arrived]) -> None:
         """Be told of a step of the service, and of what it took in."""
@@ -124,6 +129,7 @@ def open_web(live: Live, options: WebOptions, clock: Callable[[], float] = time.
         raise _refused(options, error) from error
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD)
         listening.bind(place)
         listening.listen()
     except OSError as error:
@@ -138,6 +144,11 @@ def _refused(options: WebOptions, error: OSError) -> OutputError:
         "an address of this machine and a port that is free",
         "choose another port",
     )
+
+
+def _is_error(record: logging.LogRecord) -> bool:
+    """A WebSocket that is refused with a status is none, though uvicorn takes it for one."""
+    return "without completing handshake" not in str(record.msg)
 
 
 class _Server(uvicorn.Server):
