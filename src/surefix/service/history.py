@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import binascii
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
@@ -166,7 +165,7 @@ def shown(rows: Rows, most: int) -> IntArray:
 
 def packed(rows: Rows) -> str:
     """Rows as text, to the last bit, for the journal."""
-    return _FORM + base64.b64encode(rows.tobytes()).decode("ascii")
+    return _FORM + binascii.b2a_base64(rows.tobytes(), newline=False).decode("ascii")
 
 
 def unpacked(texts: Iterable[str]) -> Rows:
@@ -177,13 +176,13 @@ def unpacked(texts: Iterable[str]) -> Rows:
     InputError
         One is damaged, or of another version.
     """
-    found = [np.zeros(0, ROW)]
+    found = bytearray()
     for text in texts:
         try:
-            if not text.startswith(_FORM):
-                raise ValueError
-            data = base64.b64decode(text.removeprefix(_FORM), validate=True)
-            found.append(np.frombuffer(data, ROW))
-        except (ValueError, binascii.Error) as error:
-            raise InputError(f"rows of a journal: {text[:40]!r}", f"{_FORM}…") from error
-    return np.concatenate(found)
+            data = binascii.a2b_base64(text.removeprefix(_FORM), strict_mode=True)
+        except (ValueError, binascii.Error):
+            data = b"?"
+        if not text.startswith(_FORM) or len(data) % ROW.itemsize:
+            raise InputError(f"rows of a journal: {text[:40]!r}", f"{_FORM}…")
+        found += data
+    return np.frombuffer(bytes(found), ROW)
