@@ -5,8 +5,9 @@ import threading
 from contextlib import contextmanager
 
 import httpx
+import numpy as np
 
-from service.test_station import recorded
+from service.test_station import minutes, recorded, sentence
 from surefix.service.inbox import Arrived
 from surefix.service.live import begin_live, step
 from surefix.service.options import read_live
@@ -105,6 +106,29 @@ def web_options(folder, more="", address="127.0.0.1:0"):
     place = folder / "live.toml"
     place.write_text(_LIVE.format(address=address, more=more))
     return read_live(place)
+
+
+def voyage(seconds, seed=3):
+    """Sentences of a boat that turns, 1 Hz, as they come each second: wild fixes, a run, a gap."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(seconds)
+    course = np.radians(20.0 + 50.0 * np.sin(k / 60.0))
+    speed = 2.3 + 0.3 * np.sin(k / 25.0)
+    north, east = (np.cumsum(speed * turn(course)) for turn in (np.cos, np.sin))
+    place = np.column_stack((north, east, 4.0 + 0.4 * np.sin(k / 9.0)))
+    place += rng.normal(0.0, [0.8, 0.8, 0.3], place.shape)
+    wild = rng.random(seconds) < 0.06
+    place[wild, :2] += rng.normal(0.0, 25.0, (int(wild.sum()), 2))
+    place[(k >= 200) & (k < 215), :2] += [30.0, -18.0]
+    latitude, longitude = 54.0 + place[:, 0] / 111_300.0, 10.0 + place[:, 1] / 65_600.0
+    for i in k.tolist():
+        clock = f"12{i // 60:02d}{i % 60:02d}.00"
+        where = f"{minutes(latitude[i], 2)},N,{minutes(longitude[i], 3)},E"
+        knots, degrees = speed[i] / 0.514444 + rng.normal(0.0, 0.1), np.degrees(course[i]) % 360.0
+        gga = sentence(f"GPGGA,{clock},{where},1,08,1.0,{place[i, 2]:.2f},M,40.0,M,,")
+        rmc = sentence(f"GPRMC,{clock},A,{where},{knots:.2f},{degrees:.1f},010826,,,A")
+        hdt = sentence(f"HEHDT,{(degrees + rng.normal()) % 360.0:.2f},T")
+        yield (b"" if 100 <= i < 108 else gga + rmc) + hdt
 
 
 @contextmanager

@@ -82,6 +82,20 @@ const here = ({ local, dead_reckoned: dead }) => ({
   hoverinfo: "skip",
 });
 
+/** From the last row that is cleaned for good to where the vehicle is by all that came since. */
+const ahead = (rows, { local }) => {
+  const last = rows.findLast(({ clean }) => known(clean[0]));
+  return {
+    type: "scatter",
+    mode: "lines",
+    name: "not yet for good",
+    x: last ? [last.clean[0], local[0]] : [],
+    y: last ? [last.clean[1], local[1]] : [],
+    line: { color: colour("--clean"), width: 2, dash: "dot" },
+    hoverinfo: "skip",
+  };
+};
+
 const bounds = (values, spare) => {
   const finite = values.filter(known);
   if (!finite.length) return [0, 1];
@@ -117,7 +131,7 @@ export const drawPlan = async (rows, position, marks) => {
   };
   const marked = fixes(rows, marks, (row) => row.raw);
   const data = position
-    ? [marked[0], ellipse(position), track, ...marked.slice(1), here(position)]
+    ? [marked[0], ellipse(position), track, ahead(rows, position), ...marked.slice(1), here(position)]
     : [marked[0], track, ...marked.slice(1)];
   drawing = true;
   try {
