@@ -1,11 +1,13 @@
 """Faults 42–47 and 50 on the web side: one bad client or page harms nobody else."""
 
+import contextlib
 import json
 import socket
 import threading
 import time
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect as listen
 
 from service.web_made import NOON, OPERATOR, TOKENS, VIEWER, served
@@ -207,6 +209,21 @@ def test_fault_46_writes_without_a_token_and_tokens_that_ended(tmp_path):
         assert status(service, request(service, "/api/live", ended, *UPGRADE)) == 401
         assert service.client(VIEWER).post(post["path"]).status_code == 403
         assert service.client(OPERATOR).post(post["path"]).status_code == 404
+
+
+def test_fault_46_a_stream_ends_with_its_session(tmp_path, monkeypatch):
+    monkeypatch.setattr(web_hub, "_CHECK", 0.1)
+    with served(tmp_path, TOKENS, rows=0) as service:
+        cookie = session(service.options.web, "viewer", service.now)
+        headers = {"Cookie": f"{cookie_name(service.options.web)}={cookie}"}
+        with listen(f"ws://{service.host}/api/live", additional_headers=headers) as stream:
+            for _ in range(3):
+                stream.recv(10.0)
+            service.now += SESSION_S
+            with contextlib.suppress(ConnectionClosed):
+                while True:
+                    stream.recv(10.0)
+            assert stream.close_code == 1008
 
 
 @pytest.mark.parametrize(

@@ -80,8 +80,11 @@ class History:
         return max(0, self.total - len(self._ring))
 
     def take(self, numbers: IntArray) -> Rows:
-        """Give the rows of some numbers, which must still be there."""
-        return self._ring[numbers % len(self._ring)]
+        """Give a copy of the rows of some numbers, which must still be there."""
+        at = numbers % len(self._ring)
+        if not len(at) or at[-1] - at[0] != len(at) - 1 or not (np.diff(at) == 1).all():
+            return self._ring[at]
+        return self._ring[at[0] : at[-1] + 1].copy()  # ten times sooner than by indices
 
     def since(self, number: int) -> IntArray:
         """Numbers of the rows that have come since the one of a number, it included."""

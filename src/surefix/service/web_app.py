@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["SessionRecord", "web_app"]
 
 _STALLED: Final = 10.0  # s without a step
+_LOOKING: Final = 2  # who may be answered about the past at a time, for the sake of memory
 _WRITTEN: Final = 5.0  # s that an answer waits for the journal
 _MOST: Final = 20_000  # rows of the past in one answer
 _JSON: Final = "application/json"
@@ -60,6 +61,7 @@ def web_app(
         s, Unix.
     """
     tokens = options.viewer.wanted or options.operator.wanted
+    looking = asyncio.Semaphore(_LOOKING)
     app = FastAPI(
         title="surefix live", docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
     )
@@ -76,8 +78,10 @@ def web_app(
         most: Annotated[int, Query(ge=1, le=_MOST)] = 2000,
     ) -> Response:
         """Give the past from ``since`` until ``until``, s, in about ``most`` rows."""
-        record = track_record(live.history, since, until, most)
-        return Response(record.model_dump_json(), media_type=_JSON)
+        async with looking:
+            record = await track_record(live.history, since, until, most)
+            text = await asyncio.to_thread(record.model_dump_json)
+        return Response(text, media_type=_JSON)
 
     @app.post("/api/alarms/{number}/acknowledge", response_model=AlarmRecord)
     async def acknowledged(number: int, request: Request) -> Response:

@@ -1,7 +1,8 @@
 """What stands before every request: limits, names, origins, tokens; and the headers of answers.
 
 A route that is added behind it is closed to all but viewers, and what changes anything to all but
-operators, unless it is named in `OPEN`.
+operators, unless it is named in `OPEN`. Behind it ``scope["state"]`` has the ``role`` of who asks,
+and ``allowed()``, which tells whether they may still, for answers that last.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final, NamedTuple, TypeVar
 
 from surefix.service.web_access import host_known, origin_known, role_of
@@ -143,7 +145,8 @@ class Guard:
         role = role_of(self._options, headers, self._clock())
         if role == "wrong" and not self._wrong.take(client, now):
             return _Refusal(429, "too many wrong tokens; wait a minute")
-        scope.setdefault("state", {})["role"] = role
+        allowed = partial(self._allowed, headers)
+        scope["state"] = {**scope.get("state", {}), "role": role, "allowed": allowed}
         method = scope.get("method", "GET")
         if method in _READS and any(
             path.startswith(each) if each.endswith("/") and each != "/" else path == each
@@ -158,6 +161,10 @@ class Guard:
             if "cookie" in headers and "authorization" not in headers and origin is None:
                 return _Refusal(403, "a browser's Origin expected")
         return None
+
+    def _allowed(self, headers: Mapping[str, str]) -> bool:
+        """Tell whether who asked in this way might still ask now."""
+        return role_of(self._options, headers, self._clock()) not in ("wrong", "nobody")
 
     async def _refuse(self, scope: Scope, refusal: _Refusal, send: Send) -> None:
         kind = "http" if scope["type"] == "http" else "websocket.http"

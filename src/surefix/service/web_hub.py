@@ -22,6 +22,7 @@ __all__ = ["Hub"]
 _BACKLOG: Final = 50  # records that a client may leave unread, besides what its socket holds
 _APART: Final = 0.1  # s between two records at least
 _IDLE: Final = 1.0  # s between two records at most
+_CHECK: Final = 10.0  # s after which it is asked again whether a client may still hear
 _ROWS: Final = 1000  # rows of a record
 
 
@@ -63,7 +64,8 @@ class Hub:
     def record(self) -> StateRecord:
         """The state at present, with the rows since the record that was sent last."""
         history = self._live.history
-        rows = rows_record(history, history.since(self._next), _ROWS)
+        numbers = history.since(self._next)
+        rows = rows_record(history.take(numbers), numbers, history.sensors, _ROWS)
         return state_record(self._live, self._clock(), rows)
 
     async def publish(self) -> None:
@@ -100,19 +102,29 @@ class Hub:
         self._state.clients = len(self._queues)
         writing = asyncio.create_task(_write(websocket, queue))
         reading = asyncio.create_task(websocket.receive())
+        ending = asyncio.create_task(_ended(websocket))
+        tasks = {writing, reading, ending}
         try:
-            await asyncio.wait({writing, reading}, return_when=asyncio.FIRST_COMPLETED)
-            if reading.done() and reading.result()["type"] == "websocket.receive":
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            if ending.done():
+                await asyncio.wait_for(websocket.close(1008, "the session has ended"), _IDLE)
+            elif reading.done() and reading.result()["type"] == "websocket.receive":
                 await asyncio.wait_for(websocket.close(1003, "this stream only speaks"), _IDLE)
         except (TimeoutError, OSError, RuntimeError, WebSocketDisconnect):
             pass
         finally:
-            for task in (writing, reading):
+            for task in tasks:
                 task.cancel()
-            await asyncio.gather(writing, reading, return_exceptions=True)
+            await asyncio.gather(*tasks, return_exceptions=True)
             self._queues.pop(websocket, None)
             self._state.clients = len(self._queues)
         return None
+
+
+async def _ended(websocket: WebSocket) -> None:
+    """Wait until the client may no longer hear: its session, or its token, has ended."""
+    while websocket.state.allowed():
+        await asyncio.sleep(_CHECK)
 
 
 async def _write(websocket: WebSocket, queue: asyncio.Queue[str]) -> None:

@@ -6,7 +6,9 @@ z up. Figures are rounded below what any sensor knows; the journal has them to t
 
 from __future__ import annotations
 
+import asyncio
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,7 +16,7 @@ from pydantic import BaseModel, Field
 
 from surefix.reasons import texts
 from surefix.service.alarms import active
-from surefix.service.history import History, shown, verdicts_of
+from surefix.service.history import History, Rows, shown, verdicts_of
 from surefix.types import FloatArray, IntArray, Verdict
 
 if TYPE_CHECKING:
@@ -209,26 +211,26 @@ def _position(known: Latest) -> PositionRecord:
     )
 
 
-def rows_record(history: History, numbers: IntArray, most: int) -> RowsRecord:
+def rows_record(rows: Rows, numbers: IntArray, sensors: Sequence[str], most: int) -> RowsRecord:
     """Make the record of rows.
 
     Parameters
     ----------
-    history
-        Where they are.
-    numbers
-        Which.
+    rows, numbers
+        (n,) what they are and their numbers, in the order of time.
+    sensors
+        Names that the rows refer to.
     most
         About how many at most; see `surefix.service.history.shown`.
     """
-    chosen = numbers[shown(history.take(numbers), most)]
-    rows = history.take(chosen)
+    chosen = shown(rows, most)
+    rows, omitted = rows[chosen], len(rows) - len(chosen)
     verdicts = verdicts_of(rows)
     return RowsRecord(
-        number=chosen.tolist(),
+        number=numbers[chosen].tolist(),
         time=np.round(rows["time"], 3).tolist(),
         sensor=rows["sensor"].tolist(),
-        sensors=list(history.sensors),
+        sensors=list(sensors),
         raw=np.round(rows["raw"], 3).tolist(),
         clean=np.round(rows["clean"], 3).tolist(),
         velocity=np.round(rows["velocity"], 4).tolist(),
@@ -237,14 +239,16 @@ def rows_record(history: History, numbers: IntArray, most: int) -> RowsRecord:
         verdict=[Verdict(code).name.lower() for code in verdicts.verdict.tolist()],
         weight=np.round(rows["weight"], 4).tolist(),
         reason=texts(verdicts),
-        omitted=len(numbers) - len(chosen),
+        omitted=omitted,
     )
 
 
-def track_record(history: History, since: float, until: float, most: int) -> TrackRecord:
-    """Make the record of a span of the past, s; its ends are included."""
+async def track_record(history: History, since: float, until: float, most: int) -> TrackRecord:
+    """Make the record of a span of the past, s, its ends included, beside the loop."""
     first, last = history.span()
-    rows = rows_record(history, history.between(since, until), most)
+    numbers = history.between(since, until)
+    given = history.take(numbers), numbers, history.sensors, most
+    rows = await asyncio.to_thread(rows_record, *given)
     return TrackRecord(first=first, last=last, rows=rows)
 
 
