@@ -70,6 +70,7 @@ class RowsRecord(BaseModel):
     sensors: list[str] = Field(description="names")
     raw: list[Vector] = Field(description="as measured: x east, y north, z up, m")
     clean: list[Vector] = Field(description="the track: x, y, z, m")
+    geodetic: list[Vector] = Field(description="the same: latitude, longitude, deg, height, m")
     velocity: list[Vector] = Field(description="m/s")
     sigma: list[Vector] = Field(description="standard deviations of clean, m")
     innovation: list[Vector] = Field(description="x, y, z over their standard deviations")
@@ -233,6 +234,7 @@ def rows_record(rows: Rows, numbers: IntArray, sensors: Sequence[str], most: int
         sensors=list(sensors),
         raw=np.round(rows["raw"], 3).tolist(),
         clean=np.round(rows["clean"], 3).tolist(),
+        geodetic=np.round(rows["geodetic"], 9).tolist(),
         velocity=np.round(rows["velocity"], 4).tolist(),
         sigma=np.round(rows["sigma"], 4).tolist(),
         innovation=np.round(rows["innovation"], 3).tolist(),

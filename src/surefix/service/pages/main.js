@@ -37,7 +37,8 @@ const showStatus = () => {
   const { record, past } = page;
   const position = record?.position;
   let [kind, text] = ["waiting", "No position yet"];
-  if (!page.heard) [kind, text] = ["lost", `Not connected; last heard ${clock(record?.time)}`];
+  if (page.role === "nobody") [kind, text] = ["waiting", "Not signed in"];
+  else if (!page.heard) [kind, text] = ["lost", `Not connected; last heard ${clock(record?.time)}`];
   else if (past) [kind, text] = ["past", `Looking back at ${clock(past.moment)}`];
   else if (position?.dead_reckoned) [kind, text] = ["dead", "Dead reckoning"];
   else if (position) [kind, text] = ["live", "Live"];
@@ -49,7 +50,9 @@ const shownPosition = () => {
   if (!page.past) return page.record?.position ?? null;
   const row = page.past.rows.findLast(({ clean }) => known(clean[0]));
   if (!row) return null;
-  return { time: row.time, local: row.clean, sigma: row.sigma, velocity: row.velocity };
+  const [latitude, longitude, height] = row.geodetic;
+  const { time, clean: local, sigma, velocity } = row;
+  return { time, latitude, longitude, height, local, sigma, velocity };
 };
 
 const showPosition = () => {
@@ -65,7 +68,7 @@ const showPosition = () => {
   return terms(at("position"), [
     ["Time", instant(position.time)],
     ...where,
-    ["Height", figure(local[2], 2, "m")],
+    ["Height", figure(position.height ?? local[2], 2, "m")],
     ["σ east, north", `${figure(sigma[0], 2)}, ${figure(sigma[1], 2, "m")}`],
     ["Speed", figure(flat ? Math.hypot(velocity[0], velocity[1]) : null, 2, "m/s")],
     ["Course", turned],
@@ -74,7 +77,7 @@ const showPosition = () => {
 
 const showRole = () => {
   const sign = at("sign");
-  say(at("role"), page.role);
+  say(at("role"), page.role === "nobody" ? "" : page.role);
   sign.hidden = !page.tokens;
   say(sign, page.signed ? "Sign out" : "Sign in");
 };
@@ -206,6 +209,7 @@ const askForToken = () => {
   page.live = [];
   lost();
   showRole();
+  showPosition();
   at("dialog").showModal();
 };
 

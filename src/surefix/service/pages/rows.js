@@ -10,6 +10,7 @@ export const unpack = (columns) =>
     sensor: columns.sensors[columns.sensor[i]] ?? "",
     raw: columns.raw[i],
     clean: columns.clean[i],
+    geodetic: columns.geodetic[i],
     velocity: columns.velocity[i],
     sigma: columns.sigma[i],
     innovation: columns.innovation[i],

@@ -17,7 +17,8 @@ export const beginStrips = async () => {
     both.dataset.axis = name;
     legend.append(both);
   }
-  await Plotly.newPlot(plot, [], layout({}), CONFIG);
+  const empty = { visible: false };
+  await Plotly.newPlot(plot, [], layout({ xaxis: empty, yaxis: empty }), CONFIG);
   fitted(plot);
 };
 
