@@ -26,7 +26,7 @@ __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
 # Of surefix live, whose file holds for surefix clean too:
-_LIVE = ("alarms", "input", "journal", "output")
+_LIVE = ("alarms", "input", "journal", "output", "web")
 _SENSOR_KEYS = ("delay_s", "sigma")
 
 

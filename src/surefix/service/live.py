@@ -23,6 +23,7 @@ from surefix.io.write_nmea import Epoch, sentences
 from surefix.service import alarms as alarm
 from surefix.service.alarms import Alarm
 from surefix.service.causes import Condition, causes
+from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
 from surefix.service.judgement import judge_sensors
@@ -47,7 +48,6 @@ from surefix.types import Cleaned
 __all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
-_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
 @dataclass
@@ -74,6 +74,10 @@ class Live:
         Those that are open, and those that were closed not long ago.
     set_by
         s by which the computer's clock was set since the service began.
+    history
+        The last rows that were cleaned for good; as many as the web side keeps.
+    watchers
+        Told of every step after what it led to is out, with what it took in.
     """
 
     options: LiveOptions
@@ -95,6 +99,13 @@ class Live:
     stored_at: float = -math.inf
     shown_at: float = -math.inf
     shed_at: float = -math.inf
+    history: History = field(default_factory=lambda: History(0))
+    watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
+
+    @property
+    def unsaved(self) -> list[Received | Told]:
+        """What the journal has not got yet, the oldest first."""
+        return [*self.keeper.waiting, *self.unwritten]
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -129,6 +140,10 @@ def begin_live(options: LiveOptions) -> Live:
     known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
     live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
     live.recorders, live.alarms = recorders, known
+    if options.web is not None:
+        live.history = History(options.web.history_rows)
+        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
+        live.history.sensors = station.session.sensors
     return live
 
 
@@ -150,9 +165,13 @@ async def run_live(
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox, steady = Inbox(), SteadyClock()
+    inbox, steady, web = Inbox(), SteadyClock(), None
     clock = clock or steady
     try:
+        if live.options.web is not None:
+            from surefix.service.web_server import open_web
+
+            web = open_web(live, live.options.web, clock)
         for wanted in live.options.outputs:
             if wanted.address.kind != "file":
                 live.outputs.append((wanted, await open_output(wanted.address)))
@@ -162,6 +181,9 @@ async def run_live(
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
                 for i, each in enumerate(live.options.inputs)
             ]
+            if web is not None:
+                live.watchers.append(web.notice)
+                tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
                 _noticed(live, inbox, clock())
@@ -169,6 +191,8 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            if web is not None:
+                web.stop()
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
@@ -190,6 +214,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     for recorder in live.recorders:
         recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
+    if live.options.web is not None and len(rows := live.history.add(batches)):
+        told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
@@ -207,6 +233,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         _heed(live, now)
     for output, text in fresh:
         output.send(text)
+    for watch in live.watchers:
+        watch(arrived)
 
 
 def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
@@ -316,7 +344,7 @@ def _epoch(known: Latest) -> Epoch:
         sigma_up=float(sigma_up),
         heading=known.heading,
         depth=known.depth,
-        known=known.time - known.observed <= _STALE,
+        known=not known.dead_reckoned,
     )
 
 

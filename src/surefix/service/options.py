@@ -25,6 +25,9 @@
     [alarms]
     position_sigma_m = 10.0           # σ above which the position is called uncertain
     dead_reckoning_s = 10.0           # time without a fix after which it is called lost
+
+    [web]                             # see surefix.service.web_options
+    address = "127.0.0.1:8000"
 """
 
 from __future__ import annotations
@@ -41,6 +44,7 @@ from surefix.io.toml_file import read_toml
 from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
+from surefix.service.web_options import WebOptions, read_web
 
 __all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
@@ -168,6 +172,8 @@ class LiveOptions:
         Time between two snapshots, s.
     alarms
         When alarms are raised.
+    web
+        Dashboard and API; None: none.
     """
 
     clean: CleanOptions
@@ -176,6 +182,7 @@ class LiveOptions:
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
     alarms: AlarmOptions = AlarmOptions()
+    web: WebOptions | None = None
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -217,6 +224,7 @@ def read_live(path: str | Path) -> LiveOptions:
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
         alarms=AlarmOptions(**alarms),
+        web=_web(place, content),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
 
@@ -238,6 +246,15 @@ def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> d
     if not isinstance(table, dict) or set(table) - keys:
         raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
     return dict(table)
+
+
+def _web(place: Path, content: dict[str, Any]) -> WebOptions | None:
+    table = content.get("web")
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise OptionsError(f"{place}: web = {table!r}", "a table [web]")
+    return read_web(place, table)
 
 
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:

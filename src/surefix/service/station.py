@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,8 @@ __all__ = [
     "resumed",
     "stored",
 ]
+
+_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
 class Latest(NamedTuple):
@@ -68,6 +70,11 @@ class Latest(NamedTuple):
     observed: float
     heading: float = math.nan
     depth: float = math.nan
+
+    @property
+    def dead_reckoned(self) -> bool:
+        """Whether no fix was used for so long that who reads the position must know."""
+        return not self.time - self.observed <= _STALE
 
 
 class Ahead(NamedTuple):
