@@ -15,6 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 from surefix.cli_compare import compare
+from surefix.cli_edit import edit
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_fleet import fleet
 from surefix.cli_inputs import (
@@ -155,6 +156,9 @@ def clean(
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
     ] = None,
+    edits: Annotated[
+        Path | None, typer.Option(help="Edits of single fixes, from surefix edit or review.")
+    ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
     iso: Annotated[bool, typer.Option("--iso", help="Write times as ISO 8601 in UTC.")] = False,
     no_checksum: NoChecksum = False,
@@ -163,8 +167,10 @@ def clean(
 ) -> None:
     """Clean a log: one row per fix, each with its verdict, beside the clean track."""
     from surefix.io.columns import mapping
+    from surefix.io.edits import read_edits
     from surefix.pipelines.clean import clean_batches
     from surefix.pipelines.deliver import deliver
+    from surefix.pipelines.editing import edit_sources
     from surefix.pipelines.inputs import open_inputs
     from surefix.pipelines.summary import lines, summary
 
@@ -188,7 +194,9 @@ def clean(
         _delays(sensor_delay or []),
     )
     check_report(report)
-    files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
+    files = [
+        path for path in (*inputs, depth, velocity, heading, options, edits) if path is not None
+    ]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
@@ -201,6 +209,8 @@ def clean(
             target=target,
             progress=told,
         )
+        if edits is not None:
+            sources = edit_sources(sources, read_edits(edits))
         done = deliver(clean_batches(sources, chosen), output or [], iso=iso)
     written = list(done.written)
     if report is not None:
@@ -291,6 +301,7 @@ app.command()(compare)
 app.command()(locate)
 app.command()(fleet)
 app.command()(live)
+app.command()(edit)
 app.command()(warmup)
 
 
