@@ -31,6 +31,7 @@ from surefix.cli_inputs import (
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_review import review
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
@@ -302,6 +303,7 @@ app.command()(locate)
 app.command()(fleet)
 app.command()(live)
 app.command()(edit)
+app.command()(review)
 app.command()(warmup)
 
 

@@ -7,7 +7,7 @@ What finds no fix is told as a problem of the input.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -21,7 +21,7 @@ from surefix.pipelines.rows import take_fixes
 from surefix.reasons import clock
 from surefix.types import BoolArray, Fixes, FloatArray, IntArray, Log, Problem
 
-__all__ = ["Wanted", "choose", "chosen_of", "digests", "edit_sources"]
+__all__ = ["Wanted", "by_sensor", "choose", "chosen_of", "digests", "edit_sources"]
 
 _TICK: Final = 1e-3  # s
 _STEPS: Final = {True: (1e-9, 1e-9, 1e-6), False: (1e-6, 1e-6, 1e-6)}  # degrees and m, or m
@@ -169,7 +169,7 @@ def choose(sources: Sequence[Source], wanted: Wanted) -> tuple[Chosen, ...]:
     OptionsError
         A sensor is named that is in no source.
     """
-    found: dict[tuple[str, str], list[Chosen]] = {}
+    found: list[Chosen] = []
     met: set[str] = set()
     for source in sources:
         for log in source.logs if source.role == "fixes" else ():
@@ -177,16 +177,21 @@ def choose(sources: Sequence[Source], wanted: Wanted) -> tuple[Chosen, ...]:
             if log.fixes is None:
                 continue
             rows = np.flatnonzero(_meant(log.fixes, log.sensors, wanted))
-            for part in chosen_of(source.name, log.sensors, log.fixes, rows):
-                found.setdefault(part[:2], []).append(part)
+            found += chosen_of(source.name, log.sensors, log.fixes, rows)
     if missing := set(wanted.sensors) - met:
         raise OptionsError(f"sensor {min(missing)!r}", "one of " + ", ".join(sorted(met)))
-    return tuple(_joined(parts) for parts in found.values())
+    return by_sensor(found)
 
 
-def _joined(parts: list[Chosen]) -> Chosen:
-    columns = zip(*(part[2:] for part in parts), strict=True)
-    return Chosen._make([*parts[0][:2], *(np.concatenate(column) for column in columns)])
+def by_sensor(parts: Iterable[Chosen]) -> tuple[Chosen, ...]:
+    """Put fixes of the same source and sensor together."""
+    found: dict[tuple[str, str], list[Chosen]] = {}
+    for part in parts:
+        found.setdefault(part[:2], []).append(part)
+    return tuple(
+        Chosen(*key, *(np.concatenate(c) for c in zip(*(p[2:] for p in same), strict=True)))
+        for key, same in found.items()
+    )
 
 
 def _meant(fixes: Fixes, sensors: Sequence[str], wanted: Wanted) -> BoolArray:
