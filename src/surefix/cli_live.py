@@ -31,6 +31,8 @@ def live(
         typer.echo(f"from {line.address}")
     for output in service.options.outputs:
         typer.echo(f"to {output.address}")
+    if service.options.web is not None:
+        typer.echo(f"dashboard at http://{service.options.web.address}")
     if service.taken:
         typer.echo(f"going on after {service.taken:,} pieces in the journal")
 

@@ -107,7 +107,7 @@ class Told(NamedTuple):
     time
         s, Unix, of validity.
     kind, text
-        ``nmea``, ``position``, ``event`` or ``alarm``, and what was said.
+        ``nmea``, ``rows`` (see `surefix.service.history`), ``event`` or ``alarm``, and what was said.
     """
 
     number: int
@@ -195,6 +195,13 @@ class Journal:
         with self._reading() as connection:
             rows = connection.execute(select(_TOLD).order_by(_TOLD.c.number))
             return [Told(n, after, _time(at), *words) for n, after, at, *words in rows]
+
+    def newest(self, kind: str, most: int) -> list[str]:
+        """Give the last texts of a kind that were told, at most so many, in their order."""
+        query = select(_TOLD.c.text).where(_TOLD.c.kind == kind)
+        with self._reading() as connection:
+            rows = connection.execute(query.order_by(_TOLD.c.number.desc()).limit(most))
+            return [str(text) for text in rows.scalars()][::-1]
 
     def sources(self) -> list[tuple[str, str]]:
         """Give name and role of the inputs."""

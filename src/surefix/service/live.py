@@ -18,10 +18,13 @@ from typing import Final
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
+from surefix.service.alarms import Alarm, Alarms, acknowledged, cleared, raised
+from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.sensors import SensorState
 from surefix.service.station import (
     Latest,
     Station,
@@ -33,10 +36,9 @@ from surefix.service.station import (
 )
 from surefix.types import Cleaned
 
-__all__ = ["Live", "begin_live", "run_live", "step"]
+__all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
-_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 _KEPT: Final = 64 << 20  # bytes that are kept for a journal that cannot be written
 
 
@@ -62,6 +64,10 @@ class Live:
         Bytes that it will never get: they are a gap of the mission.
     alarms
         What is wrong at present, by what it concerns.
+    history
+        The last rows that were cleaned for good; as many as the web side keeps.
+    watchers
+        Told of every step after what it led to is out, with what it took in.
     """
 
     options: LiveOptions
@@ -74,9 +80,12 @@ class Live:
     said: int = 0
     unwritten: list[Received | Told] = field(default_factory=list)
     lost: int = 0
-    alarms: dict[str, str] = field(default_factory=dict)
+    alarms: Alarms = ()
+    sensors: tuple[SensorState, ...] = ()
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    history: History = field(default_factory=lambda: History(0))
+    watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -100,7 +109,12 @@ def begin_live(options: LiveOptions) -> Live:
         station, _ = receive(station, [piece])
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
-    return Live(options, journal, station, lines, taken=taken, said=said)
+    live = Live(options, journal, station, lines, taken=taken, said=said)
+    if options.web is not None:
+        live.history = History(options.web.history_rows)
+        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
+        live.history.sensors = station.session.sensors
+    return live
 
 
 async def run_live(
@@ -113,8 +127,12 @@ async def run_live(
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox = Inbox()
+    inbox, web = Inbox(), None
     try:
+        if live.options.web is not None:
+            from surefix.service.web_server import open_web
+
+            web = open_web(live, live.options.web, clock)
         for wanted in live.options.outputs:
             live.outputs.append((wanted, await open_output(wanted.address)))
         async with asyncio.TaskGroup() as tasks:
@@ -122,12 +140,17 @@ async def run_live(
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
                 for i, each in enumerate(live.options.inputs)
             ]
+            if web is not None:
+                live.watchers.append(web.notice)
+                tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
                 _noticed(live, inbox)
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            if web is not None:
+                web.stop()
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
@@ -145,6 +168,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
     told = [_told(live, *what) for what in _events(batches)]
+    if live.options.web is not None and len(rows := live.history.add(batches)):
+        told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
@@ -158,6 +183,18 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     await _write(live)
     for output, text in fresh:
         output.send(text)
+    for watch in live.watchers:
+        watch(arrived)
+
+
+async def acknowledge(live: Live, number: int, by: str, now: float) -> Alarm | None:
+    """Acknowledge an alarm, and write that down; None if there is no such alarm."""
+    live.alarms = acknowledged(live.alarms, number, by, now)
+    found = next((each for each in live.alarms if each.number == number), None)
+    if found is not None:
+        live.unwritten.append(_told(live, now, "alarm", f"{by} has seen: {found.text}"))
+        await _write(live)
+    return found
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
@@ -203,7 +240,7 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
-        known=known.time - known.observed <= _STALE,
+        known=not known.dead_reckoned,
     )
 
 
@@ -224,7 +261,8 @@ def _noticed(live: Live, inbox: Inbox) -> None:
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
         live.unwritten.append(_told(live, math.nan, "alarm", text))
-        live.alarms["load"], inbox.shed = text, 0
+        live.alarms = raised(live.alarms, "load", "warning", text, time.time())
+        inbox.shed = 0
 
 
 async def _write(live: Live, *, whole: bool = False) -> None:
@@ -233,6 +271,7 @@ async def _write(live: Live, *, whole: bool = False) -> None:
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
     if live.station.session.setup is not None and (whole or due):
         snapshot = live.station.after, stored(live.station)
+    written = len(live.unwritten)
     received = [each for each in live.unwritten if isinstance(each, Received)]
     told = [each for each in live.unwritten if isinstance(each, Told)]
     if not received and not told and not whole:
@@ -240,14 +279,14 @@ async def _write(live: Live, *, whole: bool = False) -> None:
     try:
         await asyncio.to_thread(live.journal.write, received, told, snapshot)
     except OutputError as error:
-        if "journal" not in live.alarms:
-            live.alarms["journal"] = str(error)
+        live.alarms = raised(live.alarms, "journal", "alarm", str(error), time.time())
         _spare(live)
         return
     if snapshot is not None:
         live.stored_at = time.monotonic()
-    live.unwritten.clear()
-    if live.alarms.pop("journal", None) is not None and live.lost:
+    del live.unwritten[:written]
+    live.alarms = cleared(live.alarms, "journal", time.time())
+    if live.lost:
         text = f"the journal was away: {live.lost} bytes of the mission are not in it"
         live.unwritten.append(_told(live, math.nan, "alarm", text))
         live.lost = 0

@@ -18,6 +18,9 @@
 
     [journal]
     url = "sqlite:///mission.db"
+
+    [web]                             # see surefix.service.web_options
+    address = "127.0.0.1:8000"
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ from surefix.io.toml_file import read_toml
 from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
+from surefix.service.web_options import WebOptions, read_web
 
 __all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
@@ -122,6 +126,8 @@ class LiveOptions:
         URL of the journal.
     snapshot_s
         Time between two snapshots, s.
+    web
+        Dashboard and API; None: none.
     """
 
     clean: CleanOptions
@@ -129,6 +135,7 @@ class LiveOptions:
     outputs: tuple[OutputOptions, ...] = ()
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
+    web: WebOptions | None = None
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -168,6 +175,7 @@ def read_live(path: str | Path) -> LiveOptions:
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
+        web=_web(place, content),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
 
@@ -183,6 +191,15 @@ def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> d
     if not isinstance(table, dict) or set(table) - keys:
         raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
     return dict(table)
+
+
+def _web(place: Path, content: dict[str, Any]) -> WebOptions | None:
+    table = content.get("web")
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise OptionsError(f"{place}: web = {table!r}", "a table [web]")
+    return read_web(place, table)
 
 
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from surefix.service.options import LiveOptions
 from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
 __all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
+
+_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
 class Latest(NamedTuple):
@@ -49,6 +51,11 @@ class Latest(NamedTuple):
     sigma_velocity: FloatArray
     geodetic: FloatArray | None
     observed: float
+
+    @property
+    def dead_reckoned(self) -> bool:
+        """Whether no fix was used for so long that who reads the position must know."""
+        return not self.time - self.observed <= _STALE
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,138 @@
+// Series over time, one above the other: σ, speed, height, innovation.
+
+import { AXES, CONFIG, axis, colour, entry, fixes, layout, told } from "./marks.js";
+import { gapped, known } from "./rows.js";
+import { dated, place } from "./words.js";
+
+const GAP = 0.05; // of the height, between two strips
+const BAND = 3; // σ, where innovations are expected
+const plot = document.getElementById("strips");
+
+/** Prepare the strips. */
+export const beginStrips = async () => {
+  const legend = document.getElementById("axes");
+  for (const { name, dash, symbol, colour: paint } of AXES) {
+    const both = entry(name, { dash, paint: colour(paint) });
+    both.prepend(entry("", { symbol, paint: colour(paint) }).firstElementChild);
+    legend.append(both);
+  }
+  await Plotly.newPlot(plot, [], layout({}), CONFIG);
+};
+
+const line = (rows, value, more) => ({
+  type: "scatter",
+  mode: "lines",
+  x: rows.map((row) => row && place(row.time)),
+  y: rows.map((row) => row && value(row)),
+  connectgaps: false,
+  hoverinfo: "skip",
+  ...more,
+});
+
+const sigmas = (rows, yaxis) =>
+  AXES.map(({ name, dash, colour: paint }, i) =>
+    line(rows, (row) => row.sigma[i], {
+      name,
+      yaxis,
+      line: { color: colour(paint), width: 1.8, dash },
+    }),
+  );
+
+const speed = (rows, yaxis) => [
+  line(rows, ({ velocity: [x, y] }) => (known(x) && known(y) ? Math.hypot(x, y) : null), {
+    yaxis,
+    line: { color: colour("--clean"), width: 1.8 },
+  }),
+];
+
+const height = (rows, yaxis, marks, lines) => {
+  const edge = (sign) => (row) => (known(row.clean[2]) ? row.clean[2] + sign * 2 * row.sigma[2] : null);
+  const plain = { yaxis, line: { width: 0, color: colour("--clean") } };
+  return [
+    line(lines, edge(-1), plain),
+    line(lines, edge(1), { ...plain, fill: "tonexty", fillcolor: colour("--band") }),
+    ...fixes(rows.filter((row) => known(row.raw[2])), marks, (row) => [place(row.time), row.raw[2]], { yaxis }),
+    line(lines, (row) => row.clean[2], { yaxis, line: { color: colour("--clean"), width: 1.8 } }),
+  ];
+};
+
+const innovations = (rows, yaxis, marks) =>
+  AXES.map(({ name, symbol, colour: paint }, i) => {
+    const mine = rows.filter((row) => known(row.innovation[i]));
+    return {
+      type: "scatter",
+      mode: "markers",
+      name,
+      yaxis,
+      x: mine.map((row) => place(row.time)),
+      y: mine.map((row) => row.innovation[i]),
+      text: mine.map((row) => told(row, marks)),
+      hovertemplate: `${name} %{y:.1f} σ<br>%{text}<extra></extra>`,
+      marker: { symbol, size: 5, color: colour(paint), line: { color: colour(paint), width: 1 } },
+    };
+  });
+
+const band = (yref) => [
+  {
+    type: "rect",
+    xref: "paper",
+    x0: 0,
+    x1: 1,
+    yref,
+    y0: -BAND,
+    y1: BAND,
+    layer: "below",
+    line: { width: 1, color: colour("--frame"), dash: "dot" },
+    fillcolor: colour("--faint"),
+  },
+];
+
+const symmetric = (rows) => {
+  const sizes = rows.flatMap((row) => row.innovation.filter(known).map(Math.abs));
+  const most = Math.min(12, Math.max(4, ...sizes));
+  return [-most * 1.08, most * 1.08];
+};
+
+/** Draw rows from `since` until `until`, s. */
+export const drawStrips = async (rows, since, until, marks) => {
+  const lines = gapped(rows);
+  const heights = rows.some((row) => known(row.clean[2]));
+  const wanted = [
+    ["σ, m", (y) => sigmas(lines, y), { rangemode: "tozero" }],
+    ["Speed, m/s", (y) => speed(lines, y), { rangemode: "tozero" }],
+    ...(heights ? [["Height, m", (y) => height(rows, y, marks, lines), {}]] : []),
+    ["Innovation, σ", (y) => innovations(rows, y, marks), { range: symmetric(rows) }],
+  ];
+  const tall = (1 - GAP * (wanted.length - 1)) / wanted.length;
+  const data = [];
+  const settings = {};
+  wanted.forEach(([title, traces, more], i) => {
+    const end = i ? i + 1 : "";
+    const top = 1 - i * (tall + GAP);
+    data.push(...traces(`y${end}`));
+    settings[`yaxis${end}`] = axis(title, {
+      domain: [Math.max(0, top - tall), top],
+      nticks: 5,
+      fixedrange: true,
+      ...more,
+    });
+  });
+  const last = wanted.length;
+  const kind = dated(until) ? { type: "date", tickformat: "%H:%M:%S" } : { type: "linear" };
+  const frame = layout({
+    margin: { l: 56, r: 10, t: 8, b: 40 },
+    dragmode: "pan",
+    uirevision: `${since} ${until}`,
+    xaxis: axis(dated(until) ? "Time, UTC" : "Time, s", {
+      ...kind,
+      range: [place(since), place(until)],
+      anchor: `y${last}`,
+      nticks: 6,
+    }),
+    shapes: band(`y${last}`),
+    ...settings,
+  });
+  await Plotly.react(plot, data, frame, CONFIG);
+  const kinds = wanted.map(([title]) => title.split(",")[0]).join(", ");
+  plot.setAttribute("aria-label", `Series over time: ${kinds}; innovations with a band of ±3 σ`);
+};
