@@ -25,7 +25,12 @@ from surefix.io.toml_file import read_toml
 __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
-_LIVE = ("input", "output", "journal", "web")  # of surefix live, whose file holds for surefix clean too
+_LIVE = (
+    "input",
+    "output",
+    "journal",
+    "web",
+)  # of surefix live, whose file holds for surefix clean too
 _SENSOR_KEYS = ("delay_s", "sigma")
 
 

@@ -121,7 +121,7 @@ def review_app(review: Review, files: Mapping[str, Page], name: str, command: st
         return Response(dumps(found), media_type=_JSON)
 
     @app.get("/api/step")
-    def step(by: Literal[-1, 1], row: int | None = None) -> Response:
+    def step(by: int, row: int | None = None) -> Response:
         return _answer({"row": doubted(review.last.shown, row, by)})
 
     @app.post("/api/edit")

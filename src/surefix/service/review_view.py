@@ -28,7 +28,7 @@ __all__ = ["Window", "compared", "figure", "outlined", "places", "said", "told"]
 
 _OUTLINED: Final = 3_000  # marks
 _LINE: Final = 4_000
-_BEFORE: Final = {"color": INK, "width": 1.2, "dash": "dot"}
+_BEFORE: Final = {"color": INK, "width": 1.4, "dash": "dot"}
 
 
 class Window(NamedTuple):
@@ -123,7 +123,7 @@ def _plan(some: Cleaned, clock: Clock, older: _Older | None) -> Figure | None:
         return None
     if older is not None:
         east, north = older.position[:, 0], older.position[:, 1]
-        found["data"].append(_line("before", east, north, older.time))
+        found["data"].insert(0, _line("before", east, north, older.time))  # under all else
     return found | {"panels": ["plan"]}
 
 
@@ -139,7 +139,7 @@ def _strips(some: Cleaned, clock: Clock, older: _Older | None) -> Figure | None:
         time = clock.values(older.time)
         for i, name in enumerate(names):
             values = drawn_up(some, name, older.position)
-            found["data"].append(_line("before", time, values, older.time) | _axis(i))
+            found["data"].insert(0, _line("before", time, values, older.time) | _axis(i))
         apart = _line("difference", time, older.apart, older.time) | _axis(len(names))
         found["data"].append(apart | {"line": {"color": INK, "width": 1.4}})
     return found | {"panels": names}
@@ -153,6 +153,7 @@ def _with_difference(strips: Figure, titles: list[str], clock: Clock) -> Figure:
         axis = f"yaxis{i + 1 if i else ''}"
         found["layout"][axis]["range"] = strips["layout"][axis]["range"]
     found["layout"][f"yaxis{len(panels)}"]["rangemode"] = "tozero"
+    found["layout"]["shapes"] += strips["layout"]["shapes"][len(titles) :]  # events, behind frames
     return strips | {"layout": found["layout"], "height": found["height"]}
 
 

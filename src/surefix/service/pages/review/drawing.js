@@ -1,7 +1,9 @@
 // The plan view and the strips: what is drawn, zoomed into, clicked and drawn around.
 
 const Plotly = globalThis.Plotly;
-const RING = { symbol: "circle-open", size: 13, color: "#1c2733", line: { width: 2 } };
+const ring = (n) => ({
+  symbol: "circle-open", size: n > 12 ? 9 : 14, color: "#1c2733", line: { width: n > 12 ? 1.3 : 2.2 },
+});
 const CONFIG = {
   displaylogo: false,
   displayModeBar: false,
@@ -28,16 +30,18 @@ export const plot = (place, on) => {
   let hidden = new Set();
   let looked = null; // ranges that were zoomed into
   let quiet = false;
+  let drawn = 0;
 
   const plain = (trace) => ({
     ...trace,
     visible: !hidden.has(trace.name),
-    selected: { marker: { opacity: 1 } },
+    selectedpoints: null,
     unselected: { marker: { opacity: 1 } },
   });
   const around = () =>
-    rings.map((ring) => ({
-      type: "scatter", mode: "markers", name: "chosen", marker: RING, hoverinfo: "skip", ...ring,
+    rings.map((place) => ({
+      type: "scatter", mode: "markers", name: "chosen", hoverinfo: "skip",
+      marker: ring(place.x.length), ...place,
     }));
   const ranges = () => {
     const full = place._fullLayout;
@@ -56,18 +60,23 @@ export const plot = (place, on) => {
     given.margin = { l: width < 520 ? 50 : 60, r: 10, t: 8, b: 42, pad: 0 };
     given.newselection = { line: { color: "#1c2733", width: 1.5, dash: "dot" } };
     given.selections = [];
-    given.uirevision = 1;
+    given.selectionrevision = ++drawn; // what was drawn around is ringed, its line goes
     for (const [axis, range] of Object.entries(looked || {})) {
       const key = axis.replace(/^([xy])/, "$1axis");
       if (given[key]) Object.assign(given[key], { range: range.slice(), autorange: false });
     }
     return given;
   };
-  const draw = async () => {
+  let queue = Promise.resolve(); // one drawing at a time, and the last is of the newest
+  const draw = () => (queue = queue.then(drawNow, drawNow));
+  const drawNow = async () => {
     if (!figure || !place.clientWidth) return;
     quiet = true;
-    await Plotly.react(place, [...figure.data.map(plain), ...around()], layout(), CONFIG);
-    quiet = false;
+    try {
+      await Plotly.react(place, [...figure.data.map(plain), ...around()], layout(), CONFIG);
+    } finally {
+      quiet = false;
+    }
     if (place.dataset.ready) return;
     place.dataset.ready = "true";
     place.on("plotly_click", ({ points, event }) => {

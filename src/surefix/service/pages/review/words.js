@@ -59,47 +59,45 @@ const figure = (value, digits, unit) =>
 
 // Figures of this run, beside those of the one it is compared with.
 export const tabled = (place, told, compared) => {
-  const rows = Object.keys(told.verdicts)
+  const counts = Object.keys(told.verdicts)
     .filter((key) => told.verdicts[key] || (compared && compared.verdicts[key]))
-    .map((key) => [key, told.verdicts[key], compared && compared.verdicts[key], 0, ""]);
-  const pick = (name, of, digits, unit) =>
-    rows.push([name, of(told), compared && of(compared), digits, unit]);
-  pick("track", (t) => t.distance_m, 1, "m");
-  pick("fastest, clean", (t) => t.speed_mps.clean.max, 2, "m/s");
-  pick("2σ horizontal", (t) => t.two_sigma_m.horizontal, 2, "m");
-  pick("2σ vertical", (t) => t.two_sigma_m.vertical, 2, "m");
-  const cell = (kind, text) => {
-    const made = document.createElement(kind);
-    made.textContent = text;
-    return made;
-  };
-  const line = (...cells) => {
+    .map((key) => [key, (t) => t.verdicts[key], 0, ""]);
+  const figures = [
+    ["track", (t) => t.distance_m, 1, "m"],
+    ["fastest, clean", (t) => t.speed_mps.clean.max, 2, "m/s"],
+    ["2σ horizontal", (t) => t.two_sigma_m.horizontal, 2, "m"],
+    ["2σ vertical", (t) => t.two_sigma_m.vertical, 2, "m"],
+  ];
+  const apart = compared && [
+    ["tracks apart, rms", figure(compared.rms_m, 3, "m")],
+    ["most", figure(compared.most_m, 2, "m")],
+  ];
+  place.replaceChildren(table(counts, told, compared), table(figures, told, compared, apart || []));
+};
+
+const table = (rows, told, compared, more = []) => {
+  const made = document.createElement("table");
+  const line = (kind, [name, ...texts], span = 1) => {
     const row = document.createElement("tr");
-    row.append(...cells);
+    const cells = [["th", name], ...texts.map((text) => [kind, text])];
+    row.append(
+      ...cells.map(([what, text], i) => {
+        const cell = document.createElement(what);
+        cell.textContent = text;
+        if (i) cell.colSpan = span;
+        return cell;
+      }),
+    );
     return row;
   };
-  place.replaceChildren();
-  if (compared) {
-    const head = document.createElement("thead");
-    head.append(line(cell("th", ""), cell("th", "before"), cell("th", "now")));
-    place.append(head);
+  if (compared) made.createTHead().append(line("th", ["", "before", "now"]));
+  const body = made.createTBody();
+  for (const [name, of, ...how] of rows) {
+    const shown = compared ? [of(compared), of(told)] : [of(told)];
+    body.append(line("td", [name, ...shown.map((value) => figure(value, ...how))]));
   }
-  const body = document.createElement("tbody");
-  for (const [name, now, before, digits, unit] of rows) {
-    const cells = [cell("th", name)];
-    if (compared) cells.push(cell("td", figure(before, digits, unit)));
-    body.append(line(...cells, cell("td", figure(now, digits, unit))));
-  }
-  if (compared) {
-    const wide = (name, text) => {
-      const value = cell("td", text);
-      value.colSpan = 2;
-      body.append(line(cell("th", name), value));
-    };
-    wide("tracks apart, rms", figure(compared.rms_m, 3, "m"));
-    wide("tracks apart, most", figure(compared.most_m, 2, "m"));
-  }
-  place.append(body);
+  for (const cells of more) body.append(line("td", cells, 2));
+  return made;
 };
 
 // The newest edits first; those that are undone struck out.
