@@ -18,7 +18,7 @@ from typing import Final
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
-from surefix.service.alarms import Alarm, Alarms, acknowledged, cleared, raised
+from surefix.service.alarms import Alarms, acknowledged, cleared, raised
 from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
@@ -187,14 +187,13 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         watch(arrived)
 
 
-async def acknowledge(live: Live, number: int, by: str, now: float) -> Alarm | None:
-    """Acknowledge an alarm, and write that down; None if there is no such alarm."""
-    live.alarms = acknowledged(live.alarms, number, by, now)
-    found = next((each for each in live.alarms if each.number == number), None)
-    if found is not None:
-        live.unwritten.append(_told(live, now, "alarm", f"{by} has seen: {found.text}"))
-        await _write(live)
-    return found
+def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
+    """Tell that a person has seen an alarm; False if there is none of that number to be seen."""
+    before = live.alarms
+    live.alarms = acknowledged(before, number, by, now)
+    if live.alarms != before:
+        live.unwritten.append(_told(live, now, "alarm", f"{by} has seen {number}"))
+    return live.alarms != before
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:

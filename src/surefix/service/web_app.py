@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Final
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from fastapi import FastAPI, HTTPException, Query, Request, Response, WebSocket
 from pydantic import BaseModel
 
+from surefix.io.journal import Told
 from surefix.service.live import acknowledge
 from surefix.service.web_access import SESSION_S, Role, cookie_name, session
 from surefix.service.web_hub import Hub
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["SessionRecord", "web_app"]
 
 _STALLED: Final = 10.0  # s without a step
+_WRITTEN: Final = 5.0  # s that an answer waits for the journal
 _MOST: Final = 20_000  # rows of the past in one answer
 _JSON: Final = "application/json"
 
@@ -78,12 +81,16 @@ def web_app(
 
     @app.post("/api/alarms/{number}/acknowledge", response_model=AlarmRecord)
     async def acknowledged(number: int, request: Request) -> Response:
-        """Acknowledge an alarm; it is journalled when the answer comes. For operators."""
+        """Acknowledge an alarm, for operators; 202 says that the journal has not got it yet."""
         host = request.client.host if request.client else ""
-        alarm = await acknowledge(live, number, f"operator at {host}", clock())
+        acknowledge(live, number, f"operator at {host}", clock())
+        alarm = next((each for each in live.alarms if each.number == number), None)
         if alarm is None:
             raise HTTPException(404, f"no alarm {number}")
-        return Response(AlarmRecord(**alarm._asdict()).model_dump_json(), media_type=_JSON)
+        last = live.said
+        hub.notice()
+        status = 200 if await _written(live, last) else 202
+        return Response(AlarmRecord(**alarm._asdict()).model_dump_json(), status, media_type=_JSON)
 
     @app.get("/api/session")
     async def who(request: Request) -> SessionRecord:
@@ -136,6 +143,16 @@ def web_app(
         return _file(files, name, request)
 
     return app
+
+
+async def _written(live: Live, number: int) -> bool:
+    """Wait until the journal has what was told up to a number; False if that takes too long."""
+    end = time.monotonic() + _WRITTEN
+    while any(isinstance(each, Told) and each.number <= number for each in live.unwritten):
+        if time.monotonic() > end:
+            return False
+        await asyncio.sleep(0.02)
+    return True
 
 
 def _file(files: Mapping[str, Page], name: str, request: Request) -> Response:

@@ -89,6 +89,7 @@ class Web:
             await self._server.serve([self._socket])
         finally:
             publishing.cancel()
+            await asyncio.gather(publishing, return_exceptions=True)
             for connection in list(self._server.server_state.connections):
                 connection.transport.abort()
             self._socket.close()
@@ -124,6 +125,7 @@ def open_web(live: Live, options: WebOptions, clock: Callable[[], float] = time.
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(place)
+        listening.listen()
     except OSError as error:
         listening.close()
         raise _refused(options, error) from error

@@ -11,6 +11,7 @@ import { angle, clock, figure, instant } from "./words.js";
 
 const MOST = 4000; // rows in the page; more are asked for anew, thinned
 const PACE = 1000; // ms between two drawings
+const LEAST = 60; // s that the series show at least
 const SETTLE = 150; // ms that the slider rests before the past is asked for
 
 const at = (id) => document.getElementById(id);
@@ -102,8 +103,10 @@ const draw = async () => {
   try {
     const until = page.past ? page.past.moment : (newest() ?? span());
     const rows = page.past ? page.past.rows : page.live;
+    if (!rows.length && !page.past) return;
     await drawPlan(rows, shownPosition(), page.marks);
-    await drawStrips(rows, until - span(), until, page.marks);
+    const since = Math.max(until - span(), Math.min(page.first ?? until, until - LEAST));
+    await drawStrips(rows, since, until, page.marks);
     document.documentElement.dataset.drawn = String(rows.length);
   } finally {
     busy = false;

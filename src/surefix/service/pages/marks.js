@@ -72,11 +72,15 @@ export const layout = (more) => ({
   ...more,
 });
 
+/** Let a figure have the size of its place, whenever that changes. */
+export const fitted = (plot) => {
+  new ResizeObserver(() => Plotly.Plots.resize(plot)).observe(plot);
+};
+
 /** Plotly's settings: nothing leaves the page. */
 export const CONFIG = {
   displaylogo: false,
   displayModeBar: false,
-  responsive: true,
   showSendToCloud: false,
   plotlyServerURL: "",
   scrollZoom: true,

@@ -1,7 +1,7 @@
 // Plan view: fixes, track, 2σ ellipse, north up, equal axes.
 
 import { make, say } from "./build.js";
-import { CONFIG, axis, colour, entry, fixes, layout, paint } from "./marks.js";
+import { CONFIG, axis, colour, entry, fitted, fixes, layout, paint } from "./marks.js";
 import { gapped, known } from "./rows.js";
 import { figure } from "./words.js";
 
@@ -30,6 +30,7 @@ export const beginPlan = async (marks, redraw) => {
   ring.prepend(make("i.ellipse"));
   legend.append(ring);
   await Plotly.newPlot(plot, [], frame([0, 1], [0, 1]), CONFIG);
+  fitted(plot);
   plot.on("plotly_relayout", (change) => {
     if (drawing || change.autosize || !Object.keys(change).some((key) => key.includes("range"))) {
       return;
