@@ -28,6 +28,8 @@ __all__ = ["Window", "compared", "figure", "outlined", "places", "said", "told"]
 
 _OUTLINED: Final = 3_000  # marks
 _LINE: Final = 4_000
+_REJECTED: Final = 3_000  # marks
+_CROWD: Final = 300  # marks, from which they are small
 _BEFORE: Final = {"color": INK, "width": 1.4, "dash": "dot"}
 
 
@@ -80,24 +82,47 @@ def figure(
         With ``rows``, per trace the rows of its marks or None, and ``panels``, which of `PANELS`
         its y axes are. None where there is nothing to draw.
     """
-    rows = np.flatnonzero(window.holds(run.shown))
+    seen = np.flatnonzero(window.holds(run.shown))
+    rows = _fewer(run.shown, seen)
     some = _part(run.shown, rows)
     clock = clock_of(run.shown.track.time)
     older = _older(run, before, rows) if before is not None else None
     found = (_plan if of == "plan" else _strips)(some, clock, older)
     if found is None:
         return None
-    groups = {
-        MARKS[group.verdict].name: rows[group.rows]
-        for group in drawn(some.raw_position, some.verdicts)
-    }
-    found["rows"] = [groups.get(trace.get("name", "")) for trace in found["data"]]
+    groups = {g.verdict: rows[g.rows] for g in drawn(some.raw_position, some.verdicts)}
+    named = {MARKS[verdict].name: mine for verdict, mine in groups.items()}
+    found["rows"] = [named.get(trace.get("name", "")) for trace in found["data"]]
+    found["note"] = _note(groups, run.shown, seen)
     changed = waiting[window.holds(run.shown)[waiting]]
     changed = changed[:: max(1, -(-len(changed) // _OUTLINED))]
     for i, panel in enumerate(found["panels"]):
         found["data"].append(_ring(*places(run.shown, panel, changed, clock), i))
         found["rows"].append(None)
     return found
+
+
+def _fewer(cleaned: Cleaned, rows: IntArray) -> IntArray:
+    """Rows without most of the rejected ones, where these are too many to be drawn smoothly."""
+    wrong = rows[cleaned.verdicts.verdict[rows] == Verdict.REJECTED]
+    columns = np.column_stack(
+        [cleaned.raw_position[wrong], cleaned.verdicts.innovation_sigma[wrong]]
+    )
+    return np.setdiff1d(rows, np.delete(wrong, extremes(columns, _REJECTED)), assume_unique=True)
+
+
+def _note(groups: dict[Verdict, IntArray], cleaned: Cleaned, rows: IntArray) -> str:
+    """Say what of the window is not drawn; empty where everything is."""
+    known = np.isfinite(cleaned.raw_position[rows]).any(axis=1)
+    verdicts = cleaned.verdicts.verdict[rows][known]
+    totals = {verdict: int((verdicts == verdict).sum()) for verdict in groups}
+    parts = [
+        f"{len(mine):,} of {totals[verdict]:,} {MARKS[verdict].name}"
+        for verdict, mine in groups.items()
+        if len(mine) < totals[verdict]
+    ]
+    said = f"Drawn are {' and '.join(parts)} fixes, those that stand out: zoom in to see more. "
+    return said + "A box or a line around fixes means all of them." if parts else ""
 
 
 class _Older(NamedTuple):
@@ -163,14 +188,19 @@ def _axis(index: int) -> dict[str, str]:
 
 def _ring(x: Any, y: FloatArray, index: int) -> dict[str, Any]:
     """Rings around fixes whose edits wait for the next run."""
-    line = {"width": 2, "color": MARKS[Verdict.EDITED].colour}
+    line = {"width": 2 if len(y) < _CROWD else 1, "color": MARKS[Verdict.EDITED].colour}
     return _axis(index) | {
         "type": "scatter",
         "mode": "markers",
         "name": "waits for a run",
         "x": x,
         "y": y,
-        "marker": {"symbol": "diamond-open", "size": 12, "color": line["color"], "line": line},
+        "marker": {
+            "symbol": "diamond-open",
+            "size": 12 if len(y) < _CROWD else 7,
+            "color": line["color"],
+            "line": line,
+        },
         "hoverinfo": "skip",
     }
 

@@ -10,6 +10,7 @@ const CONFIG = {
   responsive: false,
   scrollZoom: true,
   doubleClick: false,
+  showTips: false,
   showSendToCloud: false,
   plotlyServerURL: "",
 };

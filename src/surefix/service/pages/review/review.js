@@ -37,12 +37,11 @@ const choose = tried(async (part, add) => {
     : { total: 0, verdicts: {}, marks: null, text: "" };
   if (found.first !== undefined && found.total) page.at = found.first;
   const marks = found.marks;
-  const y = { plan: "north", east: "east", north: "north", vertical: "vertical" };
-  plan.ring(() => (marks ? [{ x: marks.east, y: marks.north }] : []));
-  strips.ring((panels) =>
+  await plan.ring(() => (marks ? [{ x: marks.east, y: marks.north }] : []));
+  await strips.ring((panels) =>
     panels.map((name, i) => ({
       x: marks ? marks.time : [],
-      y: marks ? marks[y[name]] : [],
+      y: marks ? marks[name] : [],
       xaxis: "x",
       yaxis: i ? `y${i + 1}` : "y",
     })),
