@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.exceptions import TyperException
 
+from surefix.cli_begin import begin
 from surefix.cli_compare import compare
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_fleet import fleet
@@ -299,6 +300,8 @@ def main() -> None:
     _use_utf8()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))  # unfinished files are removed
     try:
+        if not {"--help", "--version"} & {*sys.argv}:
+            begin()
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:
             _fail("interrupted", _INTERRUPTED)
