@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.exceptions import TyperException
 
+from surefix.cli_begin import begin
 from surefix.cli_compare import compare
 from surefix.cli_edit import edit
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
@@ -315,6 +316,8 @@ def main() -> None:
     _use_utf8()
     obey()
     try:
+        if not {"--help", "--version"} & {*sys.argv}:
+            begin()
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:
             _fail("interrupted", _INTERRUPTED)
