@@ -18,6 +18,7 @@ from surefix.filters.hypotheses import (
     RESTART,
     VELOCITY_OUT,
     VELOCITY_POOR,
+    WALK,
     Bank,
     Prior,
 )
@@ -29,6 +30,12 @@ from surefix.filters.hypothesis_density import (
     usual_or_poor,
     wild_product,
     wrapped,
+)
+from surefix.filters.hypothesis_drags import (
+    drag_candidate,
+    dragged_axes,
+    outlasts,
+    supposes,
 )
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
@@ -220,11 +227,13 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
+    drags = -1 if decided else supposes(prior, bank, place)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
         running, own = bank.run[k] >= 0, bank.run[k] == sensor
-        distance = near = square = offset = 0.0
+        walks = own and bank.walks[k] != 0
+        distance = near = square = offset = stray = 0.0
         volume = wider = whole = 1.0
         unknown = due = False
         for a in range(d):
@@ -250,6 +259,7 @@ def position_branches(
                     more = 2.0 * bank.covariance[k, a, 0, b] + bank.covariance[k, a, b, b]
                     nu = wrapped(nu - bank.mean[k, a, b], motion.period)
                     offset += log_normal(nu, S[a] + more)
+                    stray += nu * nu / (S[a] + more)
             distance += close[a]
             volume *= S[a]
             square += wild[a]
@@ -283,13 +293,32 @@ def position_branches(
             code[total] = POOR if poor else 0
             if running and belongs - offset > _PREFERS:
                 code[total] |= DENY
+            if i == drags:
+                dragged = dragged_axes(prior, bank, k, z, time)
+                if dragged:
+                    parent[total] = i
+                    score[total + 1] = base + agrees + math.log(prior.drag)
+                    code[total + 1] = WALK | dragged
+                    total += 1
         parent[total] = i
         total += 1
         outside = wild_product(square, whole, observed)
         score[total] = usual + outside + wrong
         parent[total], code[total] = i, mask
         total += 1
-        strange = distance > GROSS and not unknown
+        if walks and not outlasts(prior, bank, k, time):
+            goes_on, says = drag_candidate(motion, prior, bank, k, z, variance, time)
+            score[total] = base + goes_on + staying
+            parent[total], code[total] = i, says
+            total += 1
+        strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
+        if strange and not unknown:
+            dragged = dragged_axes(prior, bank, k, z, time)
+            if dragged:
+                score[total] = base + outside + burst
+                parent[total], code[total] = i, WALK | dragged
+                total += 1
+        strange = distance > GROSS and not unknown and not walks
         if strange and (own or not running):
             score[total] = base + outside + burst
             parent[total], code[total] = i, OPEN
@@ -301,11 +330,12 @@ def position_branches(
                 score[total] = base + swift + turned
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
-        if own and not unknown:
+        if own and not unknown and not walks:
             score[total] = base + offset + lasting
             parent[total], code[total] = i, CONTINUE
             total += 1
         confirms = running and not own and not unknown and bank.length[k] >= CONFIRMED
+        confirms = confirms and bank.walks[k] == 0
         if confirms and offset - belongs > _PREFERS:
             score[total] = base + offset + burst
             parent[total], code[total] = i, COMMIT
@@ -329,7 +359,7 @@ def position_branches(
                 total += 1
         if due:
             fresh, anew, every = _anew(prior, bank, k, z, variance, time, close, S)
-            if anew and (every or not own):
+            if anew and (every or not own) and (not walks or outlasts(prior, bank, k, time)):
                 score[total] = base + fresh
                 parent[total], code[total] = i, anew
                 total += 1
@@ -359,7 +389,7 @@ def _anew(
         if math.isnan(z[a]):
             continue
         due = bank.seen[k, a] and bank.missed[k, a] >= CONFIRMED
-        aided = bank.moved[k] > bank.lost[k, a]
+        aided = bank.moved[k, a] > bank.lost[k, a]
         patience = (_AIDED if aided else _PATIENCE) * prior.longest
         if due and time - bank.lost[k, a] >= patience:
             anew |= RESTART << a

@@ -25,6 +25,7 @@ from surefix.filters.hypotheses import (
     POOR_WEIGHT,
     VELOCITY_OUT,
     VELOCITY_POOR,
+    WALK,
     Bank,
     Found,
     Prior,
@@ -52,6 +53,7 @@ from surefix.filters.hypothesis_branches import (
     position_branches,
     velocity_branches,
 )
+from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
@@ -90,13 +92,12 @@ def _apply_velocity(
             m, P = bank.mean[i, a], bank.covariance[i, a]
             nu = z[d + a] - m[1]
             gap = time - bank.touched[i, a]
-            bank.touched[i, a] = time
+            bank.touched[i, a] = bank.moved[i, a] = time
             if code & MANOEUVRE and gap > 0.0:
                 rate = abs(nu) / reach(motion.order, 1, gap)
                 rate = max(agility(motion.density[a], gap), HASTE * rate)
                 change_rate(P, motion.order, gap, rate)
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
-    bank.moved[i] = time
 
 
 @lean_helper
@@ -117,7 +118,7 @@ def _commit_lasting(
     """Take the runs for true jumps that last too long, or longer than the track before them."""
     for i in range(bank.number[0]):
         k = place[i]
-        if bank.run[k] < 0 or bank.length[k] < CONFIRMED:
+        if bank.run[k] < 0 or bank.length[k] < CONFIRMED or bank.walks[k]:
             continue
         longest = min(prior.longest, bank.opened[k] - bank.began[k])
         if time - bank.opened[k] >= longest:
@@ -179,7 +180,8 @@ def _judge(
                 out.weight[k, d + a] += velocity
     best = best_of(bank.weight, bank.number[0])
     row = place[best]
-    if said[best] & (OPEN | CONTINUE) and not said[best] & COMMIT:
+    out.drag[k] = said[best] & WALK != 0
+    if said[best] & (OPEN | CONTINUE | WALK) and not said[best] & COMMIT:
         out.run[k] = bank.length[row]
         for a in range(d):
             out.offset[k, a] = bank.mean[row, a, motion.order]
@@ -235,6 +237,9 @@ def _run(
                 for a in range(d):
                     m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
                     predict_axis(m, P, motion.order, dt, motion.density[a])
+                    if (bank.walks[place[i]] >> a) & 1:
+                        drift = bank.drift[place[i], a]
+                        predict_drag(m, P, drift, motion.order, dt, prior.longest)
         innovate(motion, bank, place, k, z, r, found, work.noise)
         for stage in range(2):
             if stage == 0 and moved:
@@ -270,8 +275,23 @@ def _run(
                 )
             else:
                 continue
+            if stage == 1:
+                cap_drags(prior, bank, place, work.score, work.parent, work.code, total)
             count, norm = keep_best(work.score, total, work.chosen, bank.weight)
             found.evidence[k] += norm
+            if prior.drag > 0.0:
+                count = keep_drags(
+                    bank,
+                    place,
+                    work.score,
+                    work.parent,
+                    work.code,
+                    total,
+                    work.chosen,
+                    count,
+                    bank.weight,
+                    work.claims,
+                )
             for i in range(bank.number[0]):
                 work.before[i], work.spoken[i] = work.origin[i], said[i]
             give_rows(
@@ -282,7 +302,7 @@ def _run(
                 work.origin[i] = work.before[p]
                 said[i] = work.spoken[p] | what
                 if stage == 1:
-                    apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
+                    apply_position(motion, prior, bank, place[i], z, r, what, time, sensor, speed)
                 else:
                     _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
         _commit_lasting(motion, prior, bank, place, time, said)
@@ -357,5 +377,6 @@ def _blank(motion: Motion, n: int) -> Found:
         np.zeros(n, np.int64),
         np.full(n, np.nan),
         np.full((n, motion.axes), np.nan),
+        np.zeros(n, np.bool_),
         np.ones(n),
     )

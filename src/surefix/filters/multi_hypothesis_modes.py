@@ -18,6 +18,7 @@ from surefix.filters.hypothesis_lag import (
 )
 from surefix.filters.hypothesis_review import deleted_residuals, review
 from surefix.filters.hypothesis_trail import (
+    DRAGGED,
     Decisions,
     decide,
     follow,
@@ -62,6 +63,7 @@ def realtime_hypotheses(
         since,
         found.run,
         found.offset,
+        found.drag,
         found.scale,
     )
 
@@ -131,6 +133,7 @@ def _lagged(
         np.full((n, motion.groups), np.nan),
         said.run,
         np.full((n, motion.axes), np.nan),
+        said.run == DRAGGED,
         np.ones(n),
     )
 
@@ -265,7 +268,9 @@ def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> 
         count = np.bincount(run[known], minlength=len(run))
         inside = known & (count[run] > 0)
         offset[inside, a] = total[run[inside]] / count[run[inside]]
-    return whole._replace(jump=said.jump, since=since, run=length, offset=offset)
+    drag = said.run == DRAGGED
+    offset[drag] = off[drag]
+    return whole._replace(jump=said.jump, since=since, run=length, offset=offset, drag=drag)
 
 
 def _with_fixes(since: FloatArray, fix: BoolArray) -> FloatArray:
