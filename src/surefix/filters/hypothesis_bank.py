@@ -192,8 +192,9 @@ def apply_position(
     b = n - 1
     running = code & (OPEN | CONTINUE) != 0
     begins = 0
-    if code & WALK:
+    if bank.walks[k] and bank.run[k] == sensor:
         bank.length[k] += 1
+    if code & WALK:
         if bank.walks[k] == 0:
             begins = 1 if bank.run[k] < 0 else 2
             bank.walks[k] = code & _AXES

@@ -33,6 +33,7 @@ CERTAIN = 8
 _FRESH = 8.0  # longest runs are so many times what a velocity may be old that supports an axis
 _PACE = 8  # fixes after which the next drag is supposed; ages that differ by less are one class
 _CLASSES = 3  # of ages
+_HOPELESS = 50.0  # nats below the best, where a drag is given up
 _BENDS = 0.05  # probability that the rate of a drag is another from one fix to the next
 _FAR_OFF = 16.0  # squared distance from which an offset is no noise
 _SKEW = 0.02  # share of the speed that a velocity may be wrong by for good: a degree of heading
@@ -275,7 +276,8 @@ def keep_drags(
         while length >= _PACE:
             length //= _PACE
             j += 1
-        if j < _CLASSES and (best[j] < 0 or score[i] > score[best[j]]):
+        hopeless = score[i] < score[chosen[0]] - _HOPELESS
+        if j < _CLASSES and not hopeless and (best[j] < 0 or score[i] > score[best[j]]):
             best[j] = i
             some = True
     if not some:
