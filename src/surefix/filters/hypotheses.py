@@ -157,11 +157,13 @@ class Bank(NamedTuple):
     touched
         (k, axes) s, when an observation of the axis was last used.
     moved
-        (k, axes) s, when a velocity was last used.
+        (k,) s, when a velocity was last used.
     scale
         (`MOST_SENSORS`,) factor of the variances of positions, as adapted.
     announced
         (1,) s, the beginning of the track as it was last told.
+    heard
+        (`MOST_SENSORS`, 2·axes) s, when each sensor last observed each component.
     """
 
     time: FloatArray
@@ -184,6 +186,7 @@ class Bank(NamedTuple):
     moved: FloatArray
     scale: FloatArray
     announced: FloatArray
+    heard: FloatArray
 
 
 class Trail(NamedTuple):
@@ -264,7 +267,8 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
         np.full((most, d), np.nan),
-        np.full((most, d), np.nan),
+        np.full(most, np.nan),
         np.ones(MOST_SENSORS),
         np.full(1, np.nan),
+        np.full((MOST_SENSORS, 2 * d), np.nan),
     )

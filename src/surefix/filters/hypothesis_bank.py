@@ -60,7 +60,6 @@ def _copy(bank: Bank, to: int, k: int, d: int, n: int) -> None:
         bank.lost[to, a] = bank.lost[k, a]
         bank.missed[to, a] = bank.missed[k, a]
         bank.touched[to, a] = bank.touched[k, a]
-        bank.moved[to, a] = bank.moved[k, a]
         if bank.walks[k]:
             for j in range(4):
                 bank.drift[to, a, j] = bank.drift[k, a, j]
@@ -70,6 +69,7 @@ def _copy(bank: Bank, to: int, k: int, d: int, n: int) -> None:
     bank.opened[to] = bank.opened[k]
     bank.length[to] = bank.length[k]
     bank.faulty[to] = bank.faulty[k]
+    bank.moved[to] = bank.moved[k]
 
 
 @inner

@@ -294,7 +294,7 @@ def position_branches(
             if running and belongs - offset > _PREFERS:
                 code[total] |= DENY
             if i == drags:
-                dragged = dragged_axes(prior, bank, k, z, time)
+                dragged = dragged_axes(prior, bank, k, z, time, sensor)
                 if dragged:
                     parent[total] = i
                     score[total + 1] = base + agrees + math.log(prior.drag)
@@ -313,7 +313,7 @@ def position_branches(
             total += 1
         strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
         if strange and not unknown:
-            dragged = dragged_axes(prior, bank, k, z, time)
+            dragged = dragged_axes(prior, bank, k, z, time, sensor)
             if dragged:
                 score[total] = base + outside + burst
                 parent[total], code[total] = i, WALK | dragged
@@ -389,7 +389,7 @@ def _anew(
         if math.isnan(z[a]):
             continue
         due = bank.seen[k, a] and bank.missed[k, a] >= CONFIRMED
-        aided = bank.moved[k, a] > bank.lost[k, a]
+        aided = bank.moved[k] > bank.lost[k, a]
         patience = (_AIDED if aided else _PATIENCE) * prior.longest
         if due and time - bank.lost[k, a] >= patience:
             anew |= RESTART << a

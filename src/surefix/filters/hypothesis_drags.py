@@ -1,7 +1,7 @@
-"""Kernels on drags: the fixes of a sensor wander off, beside velocities that do not.
+"""Kernels on drags: the fixes of a sensor wander off, beside others that do not.
 
 Nothing shows when a drag begins, so that it is supposed now and then that one does, and what is
-supposed is kept however improbable it is. In a drag the track is dead reckoned. What the fixes are
+supposed is kept however improbable it is. In a drag the track is what velocities and other sensors say. What the fixes are
 off by is followed by itself, ``[b, c]`` with c its rate: neither says anything of the track.
 """
 
@@ -69,13 +69,26 @@ def _rate(prior: Prior, a: int) -> float:
     return prior.spread[a] / prior.longest
 
 
+@inner
+def _supported(prior: Prior, bank: Bank, a: int, c: int, time: float, sensor: int) -> bool:
+    """Whether component c of axis a was observed lately, its position by another ``sensor``."""
+    for other in range(bank.heard.shape[0]):
+        if (c != a or other != sensor) and time - bank.heard[other, c] <= prior.longest / _FRESH:
+            return True
+    return False
+
+
 @lean_helper
-def dragged_axes(prior: Prior, bank: Bank, k: int, z: FloatArray, time: float) -> int:
-    """Axes of a fix that velocities support, as bits."""
-    mask = 0
-    for a in range(bank.seen.shape[1]):
-        fresh = time - bank.moved[k, a] <= prior.longest / _FRESH
-        if fresh and bank.seen[k, a] and not math.isnan(z[a]):
+def dragged_axes(
+    prior: Prior, bank: Bank, k: int, z: FloatArray, time: float, sensor: int
+) -> int:
+    """Axes of a fix that velocities or another sensor support, as bits."""
+    mask, d = 0, bank.seen.shape[1]
+    for a in range(d):
+        if not bank.seen[k, a] or math.isnan(z[a]):
+            continue
+        beside = _supported(prior, bank, a, a, time, sensor)
+        if beside or _supported(prior, bank, a, d + a, time, sensor):
             mask |= 1 << a
     return mask
 
@@ -192,6 +205,7 @@ def drag_axis(
 def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
     """Call a drag certain once its offset is more than noise, and than biased velocities do."""
     distance = square = speed = 0.0
+    beside = True
     for a in range(bank.seen.shape[1]):
         if not (bank.walks[k] >> a) & 1:
             continue
@@ -199,7 +213,8 @@ def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
         distance += off * off / (bank.covariance[k, a, 0, 0] + bank.covariance[k, a, b, b])
         square += off * off
         speed += bank.mean[k, a, 1] * bank.mean[k, a, 1]
-    age = time - bank.opened[k]
+        beside = beside and _supported(prior, bank, a, a, time, bank.run[k])
+    age = 0.0 if beside else time - bank.opened[k]
     bias = prior.steady * prior.steady + _SKEW * _SKEW * speed
     if distance > _FAR_OFF and square > bias * age * age:
         bank.walks[k] |= CERTAIN

@@ -63,7 +63,7 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
-_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced"})
+_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard"})
 
 
 @inner
@@ -92,12 +92,13 @@ def _apply_velocity(
             m, P = bank.mean[i, a], bank.covariance[i, a]
             nu = z[d + a] - m[1]
             gap = time - bank.touched[i, a]
-            bank.touched[i, a] = bank.moved[i, a] = time
+            bank.touched[i, a] = time
             if code & MANOEUVRE and gap > 0.0:
                 rate = abs(nu) / reach(motion.order, 1, gap)
                 rate = max(agility(motion.density[a], gap), HASTE * rate)
                 change_rate(P, motion.order, gap, rate)
             update_axis(m, P, motion.order + 1, 1, False, nu, r[d + a] / weight)
+    bank.moved[i] = time
 
 
 @lean_helper
@@ -229,6 +230,9 @@ def _run(
             r[d + a] = epochs.variance[k, d + a]
             placed = placed or not math.isnan(z[a])
             moved = moved or not math.isnan(z[d + a])
+        for c in range(2 * d):
+            if not math.isnan(z[c]):
+                bank.heard[sensor, c] = time
         if epochs.jump[k]:
             _displace(motion, bank, place, epochs.jump[k])
         for i in range(bank.number[0]):
