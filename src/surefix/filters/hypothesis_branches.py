@@ -47,6 +47,7 @@ __all__ = [
     "GROSS",
     "ROW",
     "position_branches",
+    "slipped",
     "velocity_branches",
 ]
 
@@ -59,6 +60,7 @@ CONFIRMED = 3
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
+_SLIPPED = 1.5  # variance of a velocity beside what it was off by in the mean, in its own
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
@@ -134,7 +136,7 @@ def velocity_branches(
                 c = d + a
                 if not math.isnan(z[c]):
                     change = z[c] - bank.mean[k, a, 1] - bank.slip[k, a]
-                    alike += log_normal(change, bank.covariance[k, a, 1, 1] + 2.0 * variance[c])
+                    alike += log_normal(change, slipped(motion, bank, a, time, sensor, variance[c]))
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
@@ -146,7 +148,7 @@ def velocity_branches(
             score[total] = base + outside + bad
             parent[total], code[total] = i, VELOCITY_OUT
             total += 1
-        strange = math.isnan(forced[d]) and distance > _STRANGE
+        strange = math.isnan(forced[d]) and distance > _STRANGE and bank.walks[k] == 0
         if strange and prior.manoeuvre > 0.0:
             swift = _swift(motion, bank, k, 1, z[d:], variance[d:], time)
             if not math.isnan(swift):
@@ -154,6 +156,17 @@ def velocity_branches(
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
     return total
+
+
+@inner
+def slipped(motion: Motion, bank: Bank, a: int, time: float, sensor: int, r: float) -> float:
+    """Variance of how a wrong velocity of axis a differs from what it was off by before.
+
+    What the track's own velocity is off by is the same in both, but for what it changed meanwhile.
+    """
+    gap = _since(bank.heard[sensor, motion.axes + a], time)
+    change = reach(motion.order, 1, gap)
+    return 2.0 * motion.density[a] * gap * change * change + _SLIPPED * r
 
 
 @lean_helper
@@ -227,7 +240,7 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
-    drags = -1 if decided else supposes(prior, bank, place)
+    drags = -1 if decided else supposes(prior, bank, place, sensor)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]

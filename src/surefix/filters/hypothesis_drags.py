@@ -94,14 +94,14 @@ def dragged_axes(
 
 
 @lean_helper
-def supposes(prior: Prior, bank: Bank, place: IntArray) -> int:
-    """Which hypothesis it is supposed of that a drag begins, by its place; −1: of none."""
+def supposes(prior: Prior, bank: Bank, place: IntArray, sensor: int) -> int:
+    """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1."""
     if not prior.drag > 0.0 or len(place) < _PACE:
         return -1
     first = -1
     for i in range(bank.number[0]):
         k = place[i]
-        if bank.walks[k] and bank.length[k] < _PACE:
+        if bank.walks[k] and bank.run[k] == sensor and bank.length[k] < _PACE:
             return -1
         if first < 0 and bank.run[k] < 0 and bank.faulty[k] == 0:
             first = i
@@ -261,6 +261,7 @@ def keep_drags(
     parent: IntArray,
     code: IntArray,
     total: int,
+    sensor: int,
     chosen: IntArray,
     count: int,
     weight: FloatArray,
@@ -270,6 +271,8 @@ def keep_drags(
 
     Parameters
     ----------
+    sensor
+        Whose drag may begin; where there are many, some share their classes.
     chosen, count, weight
         From `keep_best`; what is kept beside gets its place and its weight.
     best
@@ -281,7 +284,8 @@ def keep_drags(
         How many are kept.
     """
     some = False
-    for j in range(_CLASSES):
+    classes = len(best) // _CLASSES
+    for j in range(classes * _CLASSES):
         best[j] = -1
     for i in range(total):
         k = place[parent[i]]
@@ -291,15 +295,17 @@ def keep_drags(
         while length >= _PACE:
             length //= _PACE
             j += 1
-        hopeless = score[i] < score[chosen[0]] - _HOPELESS
-        if j < _CLASSES and not hopeless and (best[j] < 0 or score[i] > score[best[j]]):
+        if j >= _CLASSES or score[i] < score[chosen[0]] - _HOPELESS:
+            continue
+        j += _CLASSES * ((bank.run[k] if bank.walks[k] else sensor) % classes)
+        if best[j] < 0 or score[i] > score[best[j]]:
             best[j] = i
             some = True
     if not some:
         return count
     kept = score[chosen[0]] - weight[0]
     end = count
-    for j in range(_CLASSES):
+    for j in range(classes * _CLASSES):
         known = best[j] < 0
         for i in range(count):
             known = known or chosen[i] == best[j]

@@ -50,7 +50,9 @@ from surefix.filters.hypothesis_bank import (
 )
 from surefix.filters.hypothesis_branches import (
     CONFIRMED,
+    GROSS,
     position_branches,
+    slipped,
     velocity_branches,
 )
 from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
@@ -63,6 +65,7 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
+_LEARNS = 0.5  # of how much a velocity is off by a further one that is off alike
 _BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard"})
 
 
@@ -80,10 +83,17 @@ def _apply_velocity(
     """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
     if code & VELOCITY_OUT:
-        bank.faulty[i] |= bit
+        distance = 0.0
         for a in range(d):
             if not math.isnan(z[d + a]):
-                bank.slip[i, a] = z[d + a] - bank.mean[i, a, 1]
+                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
+                distance += off * off / slipped(motion, bank, a, time, sensor, r[d + a])
+        alike = bank.faulty[i] & bit and distance < GROSS
+        for a in range(d):
+            if not math.isnan(z[d + a]):
+                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
+                bank.slip[i, a] += _LEARNS * off if alike else off
+        bank.faulty[i] |= bit
         return
     bank.faulty[i] &= ~bit
     weight = POOR_WEIGHT if code & VELOCITY_POOR else 1.0
@@ -230,9 +240,6 @@ def _run(
             r[d + a] = epochs.variance[k, d + a]
             placed = placed or not math.isnan(z[a])
             moved = moved or not math.isnan(z[d + a])
-        for c in range(2 * d):
-            if not math.isnan(z[c]):
-                bank.heard[sensor, c] = time
         if epochs.jump[k]:
             _displace(motion, bank, place, epochs.jump[k])
         for i in range(bank.number[0]):
@@ -291,6 +298,7 @@ def _run(
                     work.parent,
                     work.code,
                     total,
+                    sensor,
                     work.chosen,
                     count,
                     bank.weight,
@@ -324,6 +332,9 @@ def _run(
                 trail.code[begin + i] = said[i]
             trail.first[k + 1] = begin + bank.number[0]
         report(motion, bank, place, work.share, said, best, k, found)
+        for c in range(2 * d):
+            if not math.isnan(z[c]):
+                bank.heard[sensor, c] = time
         bank.time[0] = time
 
 
