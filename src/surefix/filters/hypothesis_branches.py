@@ -34,6 +34,7 @@ from surefix.filters.hypothesis_density import (
 from surefix.filters.hypothesis_drags import (
     drag_candidate,
     dragged_axes,
+    leans,
     outlasts,
     supposes,
 )
@@ -129,7 +130,9 @@ def velocity_branches(
             seen += 1
         outside = wild_product(square, wide, seen)
         bad, good = rarely, mostly
+        leaning = False  # a drag beside velocities that are wrong, too, explains everything
         if (bank.faulty[k] >> sensor) & 1:
+            leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
             bad, good = again, over
             alike = 0.0
             for a in range(d):
@@ -144,7 +147,7 @@ def velocity_branches(
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
             total += 1
-        if not forced[d] > 0.0:
+        if not forced[d] > 0.0 and not leaning:
             score[total] = base + outside + bad
             parent[total], code[total] = i, VELOCITY_OUT
             total += 1

@@ -22,6 +22,7 @@ __all__ = [
     "drag_candidate",
     "dragged_axes",
     "keep_drags",
+    "leans",
     "make_certain",
     "outlasts",
     "predict_drag",
@@ -91,6 +92,15 @@ def dragged_axes(
         if beside or _supported(prior, bank, a, d + a, time, sensor):
             mask |= 1 << a
     return mask
+
+
+@lean_helper
+def leans(prior: Prior, bank: Bank, k: int, time: float) -> bool:
+    """Whether a drag has nothing but velocities beside it, on one of its axes at least."""
+    for a in range(bank.seen.shape[1]):
+        if (bank.walks[k] >> a) & 1 and not _supported(prior, bank, a, a, time, bank.run[k]):
+            return True
+    return False
 
 
 @lean_helper
@@ -205,7 +215,6 @@ def drag_axis(
 def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
     """Call a drag certain once its offset is more than noise, and than biased velocities do."""
     distance = square = speed = 0.0
-    beside = True
     for a in range(bank.seen.shape[1]):
         if not (bank.walks[k] >> a) & 1:
             continue
@@ -213,8 +222,7 @@ def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
         distance += off * off / (bank.covariance[k, a, 0, 0] + bank.covariance[k, a, b, b])
         square += off * off
         speed += bank.mean[k, a, 1] * bank.mean[k, a, 1]
-        beside = beside and _supported(prior, bank, a, a, time, bank.run[k])
-    age = 0.0 if beside else time - bank.opened[k]
+    age = time - bank.opened[k] if leans(prior, bank, k, time) else 0.0
     bias = prior.steady * prior.steady + _SKEW * _SKEW * speed
     if distance > _FAR_OFF and square > bias * age * age:
         bank.walks[k] |= CERTAIN
