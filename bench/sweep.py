@@ -83,8 +83,10 @@ def case(seed: int, i: int, epochs: int, rows: list[str]) -> tuple[str, Trial]:
 def missed(name: str, trial: Trial, mode: str, merit: Merit, fair: float) -> Iterator[str]:
     """Say which limits of the table a result misses."""
     bounds = BOUNDS[name]
-    most = (bounds.aided if trial.aided else bounds.alone) if mode != "realtime" else (
-        bounds.live_aided if trial.aided else bounds.live_alone
+    most = (
+        (bounds.aided if trial.aided else bounds.alone)
+        if mode != "realtime"
+        else (bounds.live_aided if trial.aided else bounds.live_alone)
     )
     if not merit.rmse_ratio <= most:
         yield f"RMSE {merit.rmse_ratio:.3f} > {most}"
@@ -145,7 +147,22 @@ def main() -> None:
             met.setdefault(f"{name} {kind}, {mode}", []).append(not faults)
             if given.record:
                 with given.record.open("a") as file:
-                    print(json.dumps({"seed": given.seed, "case": i, "row": name, "kind": kind, "axes": world.axes, "mode": mode, "fair": fair, **merit._asdict(), "missed": faults}), file=file)
+                    print(
+                        json.dumps(
+                            {
+                                "seed": given.seed,
+                                "case": i,
+                                "row": name,
+                                "kind": kind,
+                                "axes": world.axes,
+                                "mode": mode,
+                                "fair": fair,
+                                **merit._asdict(),
+                                "missed": faults,
+                            }
+                        ),
+                        file=file,
+                    )
             if faults:
                 where = f"{world.axes}d σ {world.sigma_m:.2g} m, {1 / world.interval_s:.2g} Hz"
                 print(f"{given.seed}/{i} {name} {kind} {mode} ({where}): " + "; ".join(faults))

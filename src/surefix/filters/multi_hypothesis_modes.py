@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
+from surefix.filters.hypothesis_disputes import settle_velocities
 from surefix.filters.hypothesis_lag import (
     Followed,
     filter_decided,
@@ -171,13 +172,16 @@ def decide_offline(
     recovery, n = _steady(prior), len(epochs.time)
     ahead = _decided(motion, prior, epochs)
     back = _decided(motion, prior, backward(motion, epochs))
+    d = motion.axes
+    slips = ahead.fixed[:, d] == 0.0, back.fixed[::-1, d] == 0.0
+    slipped, used = settle_velocities(motion, prior, epochs, *slips)
+    fixed = np.minimum(ahead.fixed, back.fixed[::-1])
+    fixed[used, d:] = np.maximum(ahead.fixed, back.fixed[::-1])[used, d:]
     said = Decisions(
-        np.minimum(ahead.fixed, back.fixed[::-1]),
+        fixed,
         _in_both(epochs.time, ahead.jump, back.jump[::-1], prior.longest),
         ahead.run & back.run[::-1],
     )
-    d = motion.axes
-    slipped = np.maximum(ahead.fixed[:, d], back.fixed[::-1, d]) == 0.0
     locked = np.column_stack([said.run > 0, slipped])
     for _ in range(_SWEEPS):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
