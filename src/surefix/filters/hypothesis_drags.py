@@ -80,9 +80,7 @@ def _supported(prior: Prior, bank: Bank, a: int, c: int, time: float, sensor: in
 
 
 @lean_helper
-def dragged_axes(
-    prior: Prior, bank: Bank, k: int, z: FloatArray, time: float, sensor: int
-) -> int:
+def dragged_axes(prior: Prior, bank: Bank, k: int, z: FloatArray, time: float, sensor: int) -> int:
     """Axes of a fix that velocities or another sensor support, as bits."""
     mask, d = 0, bank.seen.shape[1]
     for a in range(d):
