@@ -21,9 +21,9 @@ def live(
 ) -> None:
     """Clean live sources and hand on the position, with a journal of all that came and went."""
     import asyncio
+    import math
     import signal
 
-    from surefix.service.delays import delays_told
     from surefix.service.live import begin_live, run_live
     from surefix.service.options import read_live
 
@@ -32,6 +32,8 @@ def live(
         typer.echo(f"from {line.address}")
     for output in service.options.outputs:
         typer.echo(f"to {output.address}")
+    if service.options.web is not None:
+        typer.echo(f"dashboard at http://{service.options.web.address}")
     if service.taken:
         typer.echo(f"going on after {service.taken:,} pieces in the journal")
 
@@ -45,11 +47,12 @@ def live(
     asyncio.run(serve())
     known = service.now
     told = "no position yet" if known is None else f"the last position has σ {_sigma(known):.2f} m"
-    for delay in delays_told(service.station.delays):
-        typer.echo(
-            f"{delay.sensor}: heard {delay.median:.2f} s after it was valid, "
-            f"95 of 100 within {delay.high:.2f} s"
-        )
+    for sensor in service.station.heard:
+        if math.isfinite(sensor.latency):
+            typer.echo(
+                f"{sensor.name}: heard {sensor.latency:.2f} s after it was valid, "
+                f"95 of 100 within {sensor.slowest:.2f} s"
+            )
     typer.echo(f"stopped after {service.taken:,} pieces received; {told}")
 
 

@@ -92,7 +92,7 @@ class Told(NamedTuple):
     time
         s, Unix, of validity.
     kind, text
-        ``nmea``, ``position``, ``event`` or ``alarm``, and what was said.
+        ``nmea``, ``rows`` (of the track, packed), ``event`` or ``alarm``, and what was said.
     """
 
     number: int
@@ -169,11 +169,19 @@ class Journal:
                 return
             after = int(rows[-1][0])
 
-    def told(self) -> list[Told]:
-        """Give what was put out, in its order."""
+    def told(self, kind: str | None = None) -> list[Told]:
+        """Give what was put out, in its order; only that of a ``kind``, if one is named."""
+        query = select(_TOLD).order_by(_TOLD.c.number)
         with self._place.reading() as connection:
-            rows = connection.execute(select(_TOLD).order_by(_TOLD.c.number))
+            rows = connection.execute(query if kind is None else query.where(_TOLD.c.kind == kind))
             return [Told(n, after, _time(at), *words) for n, after, at, *words in rows]
+
+    def newest(self, kind: str, most: int) -> list[str]:
+        """Give the last texts of a kind that were told, at most so many, in their order."""
+        query = select(_TOLD.c.text).where(_TOLD.c.kind == kind)
+        with self._place.reading() as connection:
+            rows = connection.execute(query.order_by(_TOLD.c.number.desc()).limit(most))
+            return [str(text) for text in rows.scalars()][::-1]
 
     def sources(self) -> list[tuple[str, str]]:
         """Give name and role of the inputs."""

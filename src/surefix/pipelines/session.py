@@ -28,7 +28,11 @@ _PORTION = 50_000  # rows cleaned at a time in real time; or as many as it is se
 
 
 def begin_session(
-    inputs: Sequence[tuple[str, str]], options: CleanOptions, estimator: Estimator | None = None
+    inputs: Sequence[tuple[str, str]],
+    options: CleanOptions,
+    estimator: Estimator | None = None,
+    *,
+    live: bool = False,
 ) -> Session:
     """Begin to clean a log.
 
@@ -40,11 +44,12 @@ def begin_session(
         How to clean.
     estimator
         One that is not among the methods; None for the method of the options.
+    live
+        Whether an input may fall silent: one that is ``reorder_s`` behind is waited for no longer.
     """
     names, roles = [name for name, _ in inputs], [role for _, role in inputs]
-    return Session(
-        options=options, names=tuple(names), merging=begin_merging(roles), estimator=estimator
-    )
+    merging = begin_merging(roles, options.reorder_s if live else np.inf)
+    return Session(options=options, names=tuple(names), merging=merging, estimator=estimator)
 
 
 def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tuple[Cleaned, ...]]:
@@ -85,7 +90,7 @@ def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tu
     return _batches(replace(session, waiting=()), waiting, final=merging.ended)
 
 
-def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
+def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Session, tuple[Cleaned, ...]]:
     """Tell what is known of the newest rows, which still wait for late ones to be put before them.
 
     It is what `advance` would give if all inputs ended here, but for series that are not settled.
@@ -96,6 +101,11 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
         In real time and settled; it goes on from where it is.
     logs
         What is left of each input.
+
+    Returns
+    -------
+    session, batches
+        How it would stand then, and what would be done.
     """
     waiting = [*session.waiting]
     merging = session.merging
@@ -106,7 +116,7 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
                 waiting.append(chunk)
     begun = {key: parts for key, parts in session.arrived.items() if key in session.channels}
     session = replace(session, merging=merging, waiting=(), arrived=begun)
-    return _batches(session, waiting, final=True, begins=False)[1]
+    return _batches(session, waiting, final=True, begins=False)
 
 
 def _nothing_found(session: Session) -> InputError:

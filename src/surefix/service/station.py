@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,12 +20,25 @@ from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
-from surefix.service.delays import with_delays
+from surefix.service.heard import Heard, hear
 from surefix.service.options import LiveOptions
 from surefix.service.series import FRESH, series_at, with_few_series
-from surefix.types import Channel, Cleaned, Fixes, FloatArray, Log, Verdict
+from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
-__all__ = ["Latest", "Station", "begin_station", "begun", "latest", "receive", "resumed", "stored"]
+__all__ = [
+    "Ahead",
+    "Latest",
+    "Station",
+    "begin_station",
+    "fixes_begun",
+    "latest",
+    "look_ahead",
+    "receive",
+    "resumed",
+    "stored",
+]
+
+_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
 class Latest(NamedTuple):
@@ -58,6 +71,26 @@ class Latest(NamedTuple):
     heading: float = math.nan
     depth: float = math.nan
 
+    @property
+    def dead_reckoned(self) -> bool:
+        """Whether no fix was used for so long that who reads the position must know."""
+        return not self.time - self.observed <= _STALE
+
+
+class Ahead(NamedTuple):
+    """What all that was received says, were nothing to come any more.
+
+    Parameters
+    ----------
+    session
+        As it would stand; that of the station as long as nothing is settled.
+    shown
+        Where the vehicle is; None as long as nothing is settled.
+    """
+
+    session: Session
+    shown: Latest | None
+
 
 @dataclass(frozen=True)
 class Station:
@@ -73,19 +106,18 @@ class Station:
         Number of the last bytes taken.
     shown
         Where the vehicle was at the last row that is cleaned for good; None before.
+    heard
+        When something came of each sensor.
     rows
         How many rows are cleaned for good.
-    delays
-        By sensor: when observations of the last minute were received, and how long after they were
-        valid, s.
     """
 
     session: Session
     streams: tuple[NmeaStream, ...]
     after: int = 0
     shown: Latest | None = None
+    heard: tuple[Heard, ...] = ()
     rows: int = 0
-    delays: tuple[Channel, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
@@ -94,7 +126,7 @@ def begin_station(options: LiveOptions) -> Station:
     streams = tuple(
         NmeaStream(Path(each.name), each.require_checksum, each.target) for each in options.inputs
     )
-    return Station(begin_session(inputs, options.clean), streams)
+    return Station(begin_session(inputs, options.clean, live=True), streams)
 
 
 class _Stored(NamedTuple):
@@ -104,14 +136,14 @@ class _Stored(NamedTuple):
     streams: tuple[Mapping[str, object], ...]
     after: int
     shown: Latest | None
+    heard: tuple[Heard, ...]
     rows: int
-    delays: tuple[Channel, ...]
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    rest = station.after, station.shown, station.rows, station.delays
+    rest = station.after, station.shown, station.heard, station.rows
     return snapshot(_Stored(station.session, states, *rest))
 
 
@@ -138,10 +170,9 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     station, batches
         What is known now, and what is cleaned for good.
     """
-    session, streams = station.session, [*station.streams]
+    session, streams, heard = station.session, [*station.streams], station.heard
     batches: list[Cleaned] = []
     fresh: set[int] = set()
-    delays = station.delays
     for piece in received:
         if session.merging.inflows[piece.source].ended:
             continue
@@ -150,19 +181,26 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
-        delays = with_delays(delays, log.delays)
+        heard = hear(heard, piece.source, log, [*stream.begun, *stream.waiting], piece.time)
         session, done = advance(session, piece.source, log)
         batches += done
+        behind = max((each.latest for each in heard), default=-math.inf) - session.options.reorder_s
+        for i, other in enumerate(streams):
+            begun = other.begun
+            if i != piece.source and begun and begun[0][2] < behind:
+                streams[i] = other.copy()
+                session, done = advance(session, i, streams[i].settle(behind))
+                batches += done
         if not piece.data:
             session, done = advance(session, piece.source, None)
             batches += done
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
     rows = station.rows + sum(len(batch.track.time) for batch in batches)
-    return Station(session, tuple(streams), after, shown, rows, delays), tuple(batches)
+    return Station(session, tuple(streams), after, shown, heard, rows), tuple(batches)
 
 
-def begun(station: Station) -> int:
+def fixes_begun(station: Station) -> int:
     """How many fixes were begun to be read, of all inputs: more of them make a newer position."""
     inflows = station.session.merging.inflows
     pairs = zip(station.streams, inflows, strict=True)
@@ -180,21 +218,26 @@ def latest(station: Station, time: float = math.nan) -> Latest | None:
         s, Unix: later than all that was received, the track is carried on to it by dead reckoning.
         NaN: at the last fix.
     """
+    return look_ahead(station, time).shown
+
+
+def look_ahead(station: Station, time: float = math.nan) -> Ahead:
+    """Tell what all that was received says; arguments as for `latest`."""
     if station.session.setup is None:
-        return None
+        return Ahead(station.session, None)
     logs = [stream.copy().rest() for stream in station.streams]
     roles = [inflow.role for inflow in station.session.merging.inflows]
     first = roles.index("fixes")
     logs[first] = _with(logs[first], time)
-    batches = end_on_trial(with_few_series(station.session), logs)
+    session, batches = end_on_trial(with_few_series(station.session), logs)
     known = _last(batches, station.shown)
     if known is None:
-        return None
+        return Ahead(session, None)
     told = series_at(known.time, batches, station.session.names, roles)
     depth = told["depth_m"]
     if _dives(station, known.time):
         depth = -float(known.position[2] if known.geodetic is None else known.geodetic[2])
-    return known._replace(heading=told["heading_deg"], depth=depth)
+    return Ahead(session, known._replace(heading=told["heading_deg"], depth=depth))
 
 
 def _dives(station: Station, time: float) -> bool:
