@@ -93,19 +93,20 @@ def service_of(folder, names, clean=CLEAN, **more):
 def sail(live, ship, seconds, heard, *, begin=0, late=0.2):
     """Feed a service a second at a time.
 
-    ``heard(i, t)`` gives the sentences of input i of the second t, an empty text if it is silent.
+    ``heard(i, t)`` gives what input i sends in the second t, no bytes if it is silent; or a list of
+    sentences that each arrive at a time of their own.
     """
     told = []
 
     async def go():
         for second in range(begin, seconds):
             now = START + second + 0.5 + late
-            pieces = [
-                Arrived(i, START + second + 0.1 * i + late, data)
-                for i in range(len(live.options.inputs))
-                if (data := heard(i, second))
-            ]
-            await step(live, pieces, now)
+            pieces = []
+            for i in range(len(live.options.inputs)):
+                said = heard(i, second)
+                some = said if isinstance(said, list) else [(second + 0.1 * i + late, said)]
+                pieces += [Arrived(i, START + at, data) for at, data in some if data]
+            await step(live, sorted(pieces, key=lambda piece: piece.time), now)
             shown = live.now
             error, sigma = np.full(2, np.nan), math.nan
             if shown is not None:

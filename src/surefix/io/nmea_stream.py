@@ -118,7 +118,7 @@ class NmeaStream:
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
 
-        As long as there is no date, up to 500 rows wait for one.
+        As long as there is no date, not even that of the arrival, up to 500 rows wait for one.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class NmeaStream:
         self._arrival = arrival
         self._framing, frames = frame(self._framing, data)
         self._read(frames)
-        if self._clock.dated or self.size >= _UNDATED:
+        if self._clock.dated or not math.isnan(arrival) or self.size >= _UNDATED:
             return self.chunk()
         return Log(source=str(self._path))
 
