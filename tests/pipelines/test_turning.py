@@ -84,9 +84,13 @@ def test_without_a_heading_the_length_of_the_arm_is_its_uncertainty(known):
 def test_in_a_gap_of_headings_nothing_is_made_up():
     time = np.concatenate([np.arange(0.0, 20.0), np.arange(40.0, 60.0)])
     turning = turned(Turning(), [headings(time, course(time))], 0.0)
-    lever = arms_at(turning, np.array([19.0, 30.0, 40.0]), np.tile(ARM, (3, 1)), SIGMA)
-    np.testing.assert_allclose(lever[[0, 2], :2], [place(19.0), place(40.0)], atol=0.5)
-    np.testing.assert_array_equal(lever[1, :2], 0.0)
+    at = np.array([19.0, 20.5, 30.0, 39.5, 40.0])
+    lever = arms_at(turning, at, np.tile(ARM, (5, 1)), SIGMA)
+    np.testing.assert_allclose(lever[[0, 1, 4], :2], [place(t) for t in at[[0, 1, 4]]], atol=0.5)
+    np.testing.assert_array_equal(lever[2:4, :2], 0.0)
+    # … and it does not matter whether it has ended
+    before = Turning(turning.time[:20], turning.heading[:20])
+    np.testing.assert_array_equal(arms_at(before, at[:3], np.tile(ARM, (3, 1)), SIGMA), lever[:3])
 
 
 def test_headings_may_come_in_any_parts_and_old_ones_are_forgotten():

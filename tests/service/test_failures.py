@@ -41,7 +41,7 @@ FAULTS = {
     "without a fix": lambda m, place, rng: (0, place),
     "frozen": frozen,
     "jumping": lambda m, place, rng: (1, place + rng.normal(0.0, 30.0, 2)),
-    "biased": lambda m, place, rng: (1, place + [4.0, 0.0]),
+    "biased": lambda m, place, rng: (1, place + np.array([4.0, 0.0])),
     "noisy": lambda m, place, rng: (1, place + rng.normal(0.0, 1.2, 2)),
 }
 JUDGED = {
@@ -115,7 +115,9 @@ def test_without_any_receiver_it_is_dead_reckoning_and_an_alarm(tmp_path):
     sigma = [each.sigma for each in told[90:120]]
     assert np.all(np.diff(sigma[1:]) > 0.0)
     assert sigma[-1] > 5.0 * sigma[0]
-    lost = {each.time for each in told if any(a.concerns == "position" for a in active(each.alarms))}
+    lost = {
+        each.time for each in told if any(a.concerns == "position" for a in active(each.alarms))
+    }
     assert min(lost) == pytest.approx(90 + 10, abs=1)
     raised = next(a for a in told[119].alarms if a.concerns == "position")
     assert raised.priority == "alarm"

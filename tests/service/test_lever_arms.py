@@ -53,7 +53,7 @@ def figures(told, begin=61, end=10_000):
 
 def test_all_receivers_refer_to_one_point(tmp_path):
     live = service(tmp_path, ["bow", "stern"])
-    told = sail(live, SHIP, 240, heard_of(["bow", "stern"]))
+    told = sail(live, SHIP, 180, heard_of(["bow", "stern"]))
     errors, z = figures(told)
     assert np.sqrt(np.mean(errors**2)) < 0.35
     assert np.abs(errors).max() < 1.5
@@ -77,7 +77,7 @@ def test_a_compass_that_fails_makes_the_position_less_certain_not_wrong(tmp_path
     assert told[159].sensors["gyro HEHDT"].word == "stale"
     before = np.median([each.sigma for each in told[80:118]])
     assert np.median([each.sigma for each in told[150:160]]) > 5.0 * before
-    _, z = figures(told)
+    _, z = figures(told, 80)
     assert np.abs(z).max() < 5.0
     errors, _ = figures(told, 175)
     assert np.sqrt(np.mean(errors**2)) < 0.6
@@ -85,7 +85,7 @@ def test_a_compass_that_fails_makes_the_position_less_certain_not_wrong(tmp_path
 
 def spoofed(second, place):
     """Led away to the east, half a metre a second."""
-    return 1, place + [0.5 * max(second - 100, 0), 0.0]
+    return 1, place + np.array([0.5 * max(second - 100, 0), 0.0])
 
 
 def jammed(second, place):
@@ -97,15 +97,15 @@ def jammed(second, place):
 @pytest.mark.parametrize(("fault", "said"), [(spoofed, "biased"), (jammed, "stale")])
 def test_one_of_three_is_led_astray(tmp_path, fault, said):
     names = ["bow", "stern", "mast"]
-    live = service(tmp_path, names)
-    told = sail(live, SHIP, 200, heard_of(names, faults={"bow": fault}))
+    live = service(tmp_path, names, replace(CARRIED, settle_rows=120))
+    told = sail(live, SHIP, 170, heard_of(names, faults={"bow": fault}))
     state = told[-1].sensors["bow GNSS"]
     assert (state.validity, state.word) == ("invalid", said)
     for name in ("stern GNSS", "mast GNSS"):
         assert told[-1].sensors[name].validity == "valid"
-    errors, z = figures(told)
-    assert np.abs(errors).max() < 2.5
-    assert np.abs(z).max() < 5.0
+    errors, _ = figures(told)
+    assert np.abs(errors).max() < 2.0  # as far as a drag is followed before it is seen to be one
+    assert np.abs(figures(told, 150)[1]).max() < 5.0
     steps = np.abs(np.diff(errors, axis=0)).max(axis=1)
     assert steps.max() < 1.5
 
@@ -121,8 +121,6 @@ def test_the_mission_is_cleaned_again_with_the_same_arms(tmp_path):
     live.journal.close()
     again = clean_sources(open_inputs([tmp_path / "mission.db"]), live.options.clean)
     confirmed = table(join(given))
-    pd.testing.assert_frame_equal(
-        confirmed, table(again).iloc[: len(confirmed)], check_exact=True
-    )
+    pd.testing.assert_frame_equal(confirmed, table(again).iloc[: len(confirmed)], check_exact=True)
     assert len(confirmed) > 180
     assert again.track.time[0] == START

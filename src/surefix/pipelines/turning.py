@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from surefix.geo.angle import wrap
-from surefix.types import Channel, FloatArray
+from surefix.types import BoolArray, Channel, FloatArray
 
 __all__ = ["Arm", "Turning", "arms_at", "reached", "turned"]
 
@@ -101,24 +101,29 @@ def arms_at(
 def _heading_at(turning: Turning, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Heading, rad, rate of turn, rad/s, and time to the farther of the headings beside it, s.
 
-    Only headings near by are looked at, so that the numbers do not depend on where they begin.
+    Only headings near by are looked at, and none behind a gap: the numbers depend neither on where
+    the headings begin nor on whether they go on after it. A turn goes on into a gap.
     """
     n, known = len(time), turning.time
     if len(known) < 2:
         return np.zeros(n), np.zeros(n), np.full(n, np.inf)
-    heading = _without_spikes(turning.heading)
-    beyond = np.maximum(time - known[-1], 0.0)  # after the last one the turn goes on
+    together = np.diff(known) <= _AWAY
+    heading = _without_spikes(turning.heading, together)
+    place = np.arange(len(known))
+    begins = np.maximum.accumulate(np.where(np.append(False, together), 0, place))
+    ends = np.minimum.accumulate(np.where(np.append(together, False), len(known), place)[::-1])
+    at = np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)
+    start, stop = known[begins[at]], known[ends[::-1][at]]
+    beyond = np.maximum(time - stop, 0.0)
     middle = time - np.where(beyond > 0.0, beyond + _SPAN, 0.0)
-    first, last = (np.clip(middle + side, known[0], known[-1]) for side in (-_SPAN, _SPAN))
+    first, last = (np.clip(middle + side, start, stop) for side in (-_SPAN, _SPAN))
     swept = _wrapped(_between(known, heading, last) - _between(known, heading, first))
     rate = np.where(last > first, swept / np.where(last > first, last - first, 1.0), 0.0)
-    place = np.searchsorted(known, time, side="right")
-    left = time - known[np.maximum(place - 1, 0)]
-    right = known[np.minimum(place, len(known) - 1)] - time
-    away = np.where(place == 0, right, np.where(beyond > 0.0, left, np.maximum(left, right)))
-    away = np.where(left == 0.0, 0.0, away)
-    heading = _between(known, heading, time) + rate * beyond
-    return heading, rate, np.where(np.isfinite(time), away, np.inf)
+    left = time - known[at]
+    right = np.where(beyond > 0.0, 0.0, known[np.minimum(at + 1, len(known) - 1)] - time)
+    away = np.where(left == 0.0, 0.0, np.maximum(left, right))
+    heading = _between(known, heading, np.minimum(time, stop)) + rate * beyond
+    return heading, rate, np.where(time >= known[0], away, np.inf)
 
 
 def _between(known: FloatArray, heading: FloatArray, time: FloatArray) -> FloatArray:
@@ -128,11 +133,12 @@ def _between(known: FloatArray, heading: FloatArray, time: FloatArray) -> FloatA
     return heading[left] + share * _wrapped(heading[left + 1] - heading[left])
 
 
-def _without_spikes(heading: FloatArray) -> FloatArray:
+def _without_spikes(heading: FloatArray, together: BoolArray) -> FloatArray:
     """Median of each heading and its neighbours: a turn stays as it is, a single spike goes."""
     inner = heading[1:-1]
     beside = [_wrapped(heading[:-2] - inner), np.zeros_like(inner), _wrapped(heading[2:] - inner)]
-    return np.concatenate([heading[:1], inner + np.median(beside, axis=0), heading[-1:]])
+    middle = np.where(together[:-1] & together[1:], np.median(beside, axis=0), 0.0)
+    return np.concatenate([heading[:1], inner + middle, heading[-1:]])
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
