@@ -26,10 +26,8 @@ __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
 # Of surefix live, whose file holds for surefix clean too:
-_LIVE = ("alarms", "input", "journal", "output")
+_LIVE = ("alarms", "input", "journal", "output", "web")
 _SENSOR_KEYS = ("delay_s", "lever_arm", "sigma")
-
-
 _BY_SENSOR = (
     ("sigma", "sensor_sigma"),
     ("delay_s", "sensor_delay_s"),

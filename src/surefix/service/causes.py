@@ -57,7 +57,7 @@ def causes(
     if condition.position is not None and (lost := _lost(condition.position, options)):
         found["position"] = Cause("alarm", lost)
     if condition.journal:
-        found["journal"] = Cause("warning", f"away: {condition.journal}")
+        found["journal"] = Cause("warning", condition.journal)
     if condition.now - condition.shed < _GRACE:
         text = "overload: more came than could be taken; the oldest was given up"
         found["load"] = Cause("warning", text)

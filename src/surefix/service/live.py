@@ -13,6 +13,8 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -21,11 +23,14 @@ from surefix.io.write_nmea import Epoch, sentences
 from surefix.service import alarms as alarm
 from surefix.service.alarms import Alarm
 from surefix.service.causes import Condition, causes
+from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
 from surefix.service.judgement import judge_sensors
+from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.recorder import Recorder
 from surefix.service.sensors import SensorState
 from surefix.service.station import (
     Ahead,
@@ -43,8 +48,6 @@ from surefix.types import Cleaned
 __all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
-_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
-_KEPT: Final = 64 << 20  # bytes that are kept for a journal that cannot be written
 
 
 @dataclass
@@ -55,47 +58,54 @@ class Live:
     ----------
     options
         What it does.
-    journal
-        Where it is written.
+    journal, keeper
+        Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
-    lines, outputs
+    lines, outputs, recorders
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
     unwritten
-        Received and told things that the journal has not got yet.
-    lost
-        Bytes that it will never get: they are a gap of the mission.
+        What was received and told since the journal was last written.
     sensors
         How each is judged.
     alarms
         Those that are open, and those that were closed not long ago.
-    trouble
-        Why the journal cannot be written; empty if it can.
     set_by
         s by which the computer's clock was set since the service began.
+    history
+        The last rows that were cleaned for good; as many as the web side keeps.
+    watchers
+        Told of every step after what it led to is out, with what it took in.
     """
 
     options: LiveOptions
     journal: Journal
+    keeper: Keeper
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
+    recorders: list[Recorder] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
     unwritten: list[Received | Told] = field(default_factory=list)
-    lost: int = 0
     sensors: tuple[SensorState, ...] = ()
     alarms: tuple[Alarm, ...] = ()
-    trouble: str = ""
     set_by: float = 0.0
     ahead: Ahead | None = None
     fixed_at: tuple[float, float] = (math.nan, math.nan)  # validity of the last row, and when seen
     stored_at: float = -math.inf
     shown_at: float = -math.inf
     shed_at: float = -math.inf
+    history: History = field(default_factory=lambda: History(0))
+    watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
+
+    @property
+    def unsaved(self) -> list[Received | Told]:
+        """What the journal has not got yet, the oldest first."""
+        return [*self.keeper.waiting, *self.unwritten]
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -107,7 +117,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.role) for each in options.inputs])
+    journal.begin([(each.name, each.task) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -115,12 +125,32 @@ def begin_live(options: LiveOptions) -> Live:
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
+    files = [each.address.path for each in options.outputs if each.address.kind == "file"]
+    recorders = [Recorder(Path(path), station.rows) for path in files]
     for piece in journal.received(station.after):
-        station, _ = receive(station, [piece])
+        station, batches = receive(station, [piece])
+        for recorder in recorders:
+            recorder.add(batches)
+    for recorder in recorders:
+        recorder.ready()
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
+    for source, size in _replayed(options, journal).items():
+        lines[source].size = size
     known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
-    return Live(options, journal, station, lines, taken=taken, said=said, alarms=known)
+    live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live.recorders, live.alarms = recorders, known
+    if options.web is not None:
+        live.history = History(options.web.history_rows)
+        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
+        live.history.sensors = station.session.sensors
+    return live
+
+
+def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
+    """How much of the recorded logs is in the journal already, bytes: they go on from there."""
+    logs = {i for i, each in enumerate(options.inputs) if each.address.kind == "file"}
+    return {i: size for i, size in journal.sizes().items() if i in logs} if logs else {}
 
 
 async def run_live(
@@ -135,16 +165,25 @@ async def run_live(
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox, steady = Inbox(), SteadyClock()
+    inbox, steady, web = Inbox(), SteadyClock(), None
     clock = clock or steady
     try:
+        if live.options.web is not None:
+            from surefix.service.web_server import open_web
+
+            web = open_web(live, live.options.web, clock)
         for wanted in live.options.outputs:
-            live.outputs.append((wanted, await open_output(wanted.address)))
+            if wanted.address.kind != "file":
+                live.outputs.append((wanted, await open_output(wanted.address)))
+        _gaps(live)
         async with asyncio.TaskGroup() as tasks:
             reading = [
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
                 for i, each in enumerate(live.options.inputs)
             ]
+            if web is not None:
+                live.watchers.append(web.notice)
+                tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
                 _noticed(live, inbox, clock())
@@ -152,6 +191,8 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            if web is not None:
+                web.stop()
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
@@ -159,6 +200,8 @@ async def run_live(
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
+        for recorder in live.recorders:
+            recorder.close()
 
 
 async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
@@ -168,7 +211,11 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         live.taken += 1
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
+    for recorder in live.recorders:
+        recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
+    if live.options.web is not None and len(rows := live.history.add(batches)):
+        told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
@@ -180,12 +227,14 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
             fresh.append((output, text))
     live.unwritten += [*received, *told]
     _judge(live, now)
-    trouble = live.trouble
+    trouble = live.keeper.trouble
     await _write(live, now)
-    if live.trouble != trouble:
+    if live.keeper.trouble != trouble:
         _heed(live, now)
     for output, text in fresh:
         output.send(text)
+    for watch in live.watchers:
+        watch(arrived)
 
 
 def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
@@ -220,7 +269,7 @@ def _judge(live: Live, now: float) -> None:
 
 def _heed(live: Live, now: float) -> None:
     """Raise alarms for what is wrong, and clear those whose cause is gone."""
-    condition = Condition(now, live.now, live.trouble, live.shed_at, live.set_by)
+    condition = Condition(now, live.now, live.keeper.trouble, live.shed_at, live.set_by)
     found = causes(live.sensors, condition, live.options.alarms)
     _set_alarms(live, alarm.up_to_date(live.alarms, found, now), now)
 
@@ -230,6 +279,14 @@ def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
     for each in alarm.changed(live.alarms, after):
         live.unwritten.append(_told(live, now, "alarm", alarm.as_text(each)))
     live.alarms = after
+
+
+def _gaps(live: Live) -> None:
+    """Say of each recorded track which rows it will never have."""
+    for each in live.recorders:
+        if each.missing:
+            text = f"note: {each.place} lacks {each.missing} rows before these"
+            live.unwritten.append(_told(live, math.nan, "event", text))
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
@@ -271,7 +328,7 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
 
 def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
-        return Epoch(known.time, known=False)
+        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
     latitude, longitude, height = known.geodetic
     east, north, _ = known.velocity
     sigma_east, sigma_north, sigma_up = known.sigma_position
@@ -285,7 +342,9 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
-        known=known.time - known.observed <= _STALE,
+        heading=known.heading,
+        depth=known.depth,
+        known=not known.dead_reckoned,
     )
 
 
@@ -311,40 +370,29 @@ def _noticed(live: Live, inbox: Inbox, now: float) -> None:
 
 async def _write(live: Live, now: float, *, whole: bool = False) -> None:
     """Write what is not written yet, and a snapshot if it is time; without success, keep it."""
-    snapshot = None
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
-    if live.station.session.setup is not None and (whole or due):
-        snapshot = live.station.after, stored(live.station)
-    count = len(live.unwritten)
-    received = [each for each in live.unwritten if isinstance(each, Received)]
-    told = [each for each in live.unwritten if isinstance(each, Told)]
-    if not received and not told and not whole:
-        return
-    try:
-        await asyncio.to_thread(live.journal.write, received, told, snapshot)
-    except OutputError as error:
-        live.trouble = live.trouble or str(error)
-        _spare(live)
-        return
-    if snapshot is not None:
-        live.stored_at = time.monotonic()
-    del live.unwritten[:count]  # an alarm may have been acknowledged meanwhile
-    if live.trouble and live.lost:
-        text = f"gap: the journal was away, {live.lost} bytes of the mission are not in it"
-        known = alarm.raised(live.alarms, "mission", "warning", text, now)
+    keeper, records = live.keeper, live.unwritten
+    live.unwritten = []
+    snapshot = None
+    if live.station.session.setup is not None and (whole or (due and records)):
+
+        def snapshot() -> tuple[int, bytes]:
+            live.stored_at = time.monotonic()
+            for recorder in live.recorders:  # a snapshot knows of no row that is not recorded
+                recorder.flush()
+            return live.station.after, stored(live.station)
+
+    if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:
+        gap, keeper.gap = keeper.gap, Gap()
+        known = alarm.raised(live.alarms, "mission", "warning", _missing(gap), now)
         _set_alarms(live, alarm.cleared(known, "mission", now), now)
-        live.lost = 0
-    live.trouble = ""
+        if whole:
+            await keeper.keep(live.unwritten, last=True)
 
 
-def _spare(live: Live) -> None:
-    """Keep no more than there is room for: the oldest goes, and is counted."""
-    size = sum(_size(each) for each in live.unwritten)
-    while size > _KEPT:
-        gone = live.unwritten.pop(0)
-        size -= _size(gone)
-        live.lost += _size(gone)
-
-
-def _size(each: Received | Told) -> int:
-    return len(each.data) if isinstance(each, Received) else len(each.text)
+def _missing(gap: Gap) -> str:
+    text = f"gap: the journal was away, {gap.size} bytes of the mission are not in it"
+    if math.isnan(gap.first):
+        return text
+    first, last = (f"{datetime.fromtimestamp(at, UTC):%Y-%m-%dT%H:%M:%SZ}" for at in gap[2:])
+    return f"{text}, of {first} to {last}"

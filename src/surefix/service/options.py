@@ -16,12 +16,18 @@
     sentences = ["GGA", "RMC", "VTG", "GST"]
     talker = "GP"
 
+    [[output]]
+    to = "file:track.csv"             # the clean track, recorded; or .parquet
+
     [journal]
     url = "sqlite:///mission.db"
 
     [alarms]
     position_sigma_m = 10.0           # σ above which the position is called uncertain
     dead_reckoning_s = 10.0           # time without a fix after which it is called lost
+
+    [web]                             # see surefix.service.web_options
+    address = "127.0.0.1:8000"
 """
 
 from __future__ import annotations
@@ -38,6 +44,7 @@ from surefix.io.toml_file import read_toml
 from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
+from surefix.service.web_options import WebOptions, read_web
 
 __all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
@@ -45,7 +52,9 @@ SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
 
 _ROLES: Final = ("fixes", "depth", "heading")
-_INPUT: Final = {"name", "from", "role", "allow", "require_checksum", "lever_arm"}
+_INPUT: Final = {
+    "name", "from", "role", "allow", "require_checksum", "target", "lever_arm",
+}  # fmt: skip
 _TALKER: Final = re.compile(r"[A-Z]{2}")
 
 
@@ -65,6 +74,9 @@ class InputOptions:
         Networks that datagrams and clients may come from; empty: any.
     require_checksum
         False accepts sentences without one.
+    target
+        Of an acoustic positioning system: the transponder whose sightings are the fixes, or
+        ``first``, the one that is heard first; None, or ``ship``: the fixes are the receivers'.
     """
 
     name: str
@@ -72,19 +84,29 @@ class InputOptions:
     role: str = "fixes"
     allow: tuple[str, ...] = ()
     require_checksum: bool = True
+    target: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise OptionsError(f"input name {self.name!r}", "a name")
         if self.role not in _ROLES:
             raise OptionsError(f"role {self.role!r} of {self.name}", "one of " + ", ".join(_ROLES))
-        for network in self.allow:
+        for network in _texts("allow", self.allow):
             try:
                 ipaddress.ip_network(network, strict=False)
             except ValueError as error:
                 raise OptionsError(f"allow {network!r} of {self.name}", "a network") from error
         if not isinstance(self.require_checksum, bool):
             raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
+        if self.target is not None and (not isinstance(self.target, str) or not self.target):
+            raise OptionsError(f"target {self.target!r}", "the name of a transponder, or first")
+        if self.target is not None and self.role != "fixes":
+            raise OptionsError(f"target of {self.name}, a source of {self.role}", "role fixes")
+
+    @property
+    def task(self) -> str:
+        """Its role and target, as the journal has them."""
+        return self.role if self.target is None else f"{self.role} of {self.target}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,17 +118,17 @@ class OutputOptions:
     address
         Where it goes to.
     sentences
-        Some of ``SENTENCES``.
+        Some of ``SENTENCES``; HDT and DPT go out where a heading, a depth is known.
     talker
         Two letters that the sentences begin with.
     """
 
     address: Address
-    sentences: tuple[str, ...] = ("GGA", "RMC", "VTG", "GST")
+    sentences: tuple[str, ...] = TYPES
     talker: str = "GP"
 
     def __post_init__(self) -> None:
-        for name in self.sentences:
+        for name in _texts("sentences", self.sentences):
             if name not in SENTENCES:
                 raise OptionsError(f"sentence {name!r}", "one of " + ", ".join(SENTENCES))
         if not isinstance(self.talker, str) or not _TALKER.fullmatch(self.talker):
@@ -153,6 +175,8 @@ class LiveOptions:
         Time between two snapshots, s.
     alarms
         When alarms are raised.
+    web
+        Dashboard and API; None: none.
     """
 
     clean: CleanOptions
@@ -161,6 +185,7 @@ class LiveOptions:
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
     alarms: AlarmOptions = AlarmOptions()
+    web: WebOptions | None = None
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -202,8 +227,15 @@ def read_live(path: str | Path) -> LiveOptions:
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
         alarms=AlarmOptions(**alarms),
+        web=_web(place, content),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
+
+
+def _texts(name: str, values: object) -> tuple[str, ...]:
+    if isinstance(values, tuple) and all(isinstance(each, str) for each in values):
+        return values
+    raise OptionsError(f"{name} = {values!r}", 'a list of texts, as ["…"]')
 
 
 def _beside(place: Path, url: str) -> str:
@@ -217,6 +249,15 @@ def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> d
     if not isinstance(table, dict) or set(table) - keys:
         raise OptionsError(f"{place}: [{name}]", "the keys " + ", ".join(sorted(keys)))
     return dict(table)
+
+
+def _web(place: Path, content: dict[str, Any]) -> WebOptions | None:
+    table = content.get("web")
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise OptionsError(f"{place}: web = {table!r}", "a table [web]")
+    return read_web(place, table)
 
 
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:
@@ -241,7 +282,12 @@ def _output(place: Path, table: dict[str, Any]) -> OutputOptions:
     rest = _known(place, "output", table, {"to", "sentences", "talker"})
     if "to" not in rest:
         raise OptionsError(f"{place}: an output without to", "an address")
-    return OutputOptions(address=address(str(rest.pop("to")), OUTPUTS), **rest)
+    where = address(str(rest.pop("to")), OUTPUTS)
+    if where.kind == "file":
+        if rest:
+            raise OptionsError(f"{place}: {min(rest)!r} of a recorded track", "only to")
+        where = where._replace(path=str(place.parent / where.path))
+    return OutputOptions(address=where, **rest)
 
 
 def _known(place: Path, name: str, table: dict[str, Any], keys: set[str]) -> dict[str, Any]:
