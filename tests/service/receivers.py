@@ -5,9 +5,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from service.test_station import minutes, sentence
 from surefix.pipelines.options import CleanOptions
+from surefix.service import keeper
 from surefix.service.addresses import Address
 from surefix.service.inbox import Arrived
 from surefix.service.live import begin_live, step
@@ -17,6 +19,12 @@ START = 1_785_585_600.0  # 2026-08-01T12:00:00Z
 CLEAN = CleanOptions(mode="realtime", settle_rows=60, reorder_s=2.0)
 _METRES = 111_195.0
 _COSINE = math.cos(math.radians(54.0))
+
+
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch):
+    """Wait for the journal however busy the disk is: it is not what is tested here."""
+    monkeypatch.setattr(keeper, "_PATIENCE", 60.0)
 
 
 class Ship:

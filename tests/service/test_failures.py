@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from service.receivers import START, Ship, gga, sail, service_of
+from service.receivers import START, Ship, _patient, gga, sail, service_of  # noqa: F401
 from surefix.service.alarms import active
 from surefix.service.live import acknowledge, begin_live
 
