@@ -17,9 +17,12 @@ from service.receivers import (  # noqa: F401
     service_of,
 )
 from service.test_station import table
+from surefix.errors import OptionsError
+from surefix.io.options_file import read_options
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.joining import join
+from surefix.service.options import read_live
 from surefix.service.station import begin_station, receive
 
 SHIP = Ship(260.0, seed=3, turning=0.03)
@@ -132,3 +135,15 @@ def test_the_mission_is_cleaned_again_with_the_same_arms(tmp_path):
     pd.testing.assert_frame_equal(confirmed, table(again).iloc[: len(confirmed)], check_exact=True)
     assert len(confirmed) > 180
     assert again.track.time[0] == START
+
+
+def test_lever_arms_of_the_inputs_hold_for_clean_too(tmp_path):
+    place = tmp_path / "live.toml"
+    text = '[clean]\nsettle_rows = 40\n[[input]]\nname = "bow"\nfrom = "udp://0.0.0.0:1"\n'
+    place.write_text(text + "lever_arm = [40.0, 0.0, 20.0]\n")
+    assert read_live(place).clean.lever_arm == {"bow": [40.0, 0.0, 20.0]}
+    assert read_options(place).clean["lever_arm"] == {"bow": [40.0, 0.0, 20.0]}
+    for wrong in ("40.0", '["a", 0, 0]', "[1.0, 2.0]", "[nan, 0, 0]"):
+        place.write_text(text + f"lever_arm = {wrong}\n")
+        with pytest.raises(OptionsError, match="bow"):
+            read_live(place)
