@@ -38,6 +38,7 @@ from surefix.types import Cleaned
 __all__ = ["Live", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
+_DRAIN: Final = 0.01  # s: at the end, what has arrived is taken, and nothing waited for
 _STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
@@ -132,6 +133,7 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            await step(live, await inbox.take(_DRAIN), clock())
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
