@@ -74,7 +74,9 @@ def test_a_log_that_is_replayed_gives_what_clean_gives(tmp_path):
         await serving
 
     asyncio.run(run())
-    assert all(re.fullmatch(rb"\$IN(GGA|RMC|VTG|GST),.*\*[0-9A-F]{2}\r\n", line) for line in heard)
+    assert all(
+        re.fullmatch(rb"\$IN(GGA|RMC|VTG|GST|HDT),.*\*[0-9A-F]{2}\r\n", line) for line in heard
+    )
     journal = open_journal(options.journal)
     told = "".join(each.text for each in journal.told() if each.kind == "nmea")
     assert told.endswith(b"".join(heard).decode())

@@ -92,7 +92,7 @@ class Told(NamedTuple):
     time
         s, Unix, of validity.
     kind, text
-        ``nmea``, ``position``, ``event`` or ``alarm``, and what was said.
+        ``nmea``, ``rows`` (of the track, packed), ``event`` or ``alarm``, and what was said.
     """
 
     number: int
@@ -169,11 +169,19 @@ class Journal:
                 return
             after = int(rows[-1][0])
 
-    def told(self) -> list[Told]:
-        """Give what was put out, in its order."""
+    def told(self, kind: str | None = None) -> list[Told]:
+        """Give what was put out, in its order; only that of a ``kind``, if one is named."""
+        query = select(_TOLD).order_by(_TOLD.c.number)
         with self._place.reading() as connection:
-            rows = connection.execute(select(_TOLD).order_by(_TOLD.c.number))
+            rows = connection.execute(query if kind is None else query.where(_TOLD.c.kind == kind))
             return [Told(n, after, _time(at), *words) for n, after, at, *words in rows]
+
+    def newest(self, kind: str, most: int) -> list[str]:
+        """Give the last texts of a kind that were told, at most so many, in their order."""
+        query = select(_TOLD.c.text).where(_TOLD.c.kind == kind)
+        with self._place.reading() as connection:
+            rows = connection.execute(query.order_by(_TOLD.c.number.desc()).limit(most))
+            return [str(text) for text in rows.scalars()][::-1]
 
     def sources(self) -> list[tuple[str, str]]:
         """Give name and role of the inputs."""
@@ -242,6 +250,8 @@ def journal_logs(
 ) -> list[tuple[str, str, Iterator[Log]]]:
     """Open the inputs of a journal for reading: name and role of each, and its parts.
 
+    The role in the journal may name an acoustic target: ``fixes of B01``.
+
     Raises
     ------
     InputError
@@ -249,8 +259,8 @@ def journal_logs(
     """
     journal = open_journal(url, new=False)
 
-    def parts(number: int, name: str) -> Iterator[Log]:
-        stream = NmeaStream(Path(name), require_checksum)
+    def parts(number: int, name: str, target: str | None) -> Iterator[Log]:
+        stream = NmeaStream(Path(name), require_checksum, target)
         for piece in journal.received(source=number):
             if piece.data:
                 yield stream.read(piece.data, piece.time)
@@ -259,7 +269,11 @@ def journal_logs(
     sources = journal.sources()
     if not sources:
         raise InputError(f"{url}: a data base without inputs", "a journal of surefix live")
-    return [(name, role, parts(i, name)) for i, (name, role) in enumerate(sources)]
+    tasks = [(name, *task.partition(" of ")) for name, task in sources]
+    return [
+        (name, role, parts(i, name, target or None))
+        for i, (name, role, _, target) in enumerate(tasks)
+    ]
 
 
 def _row(record: Received | Told) -> dict[str, object]:

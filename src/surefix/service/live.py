@@ -14,32 +14,41 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
+from surefix.service import alarms as alarm
+from surefix.service.alarms import Alarm
+from surefix.service.causes import Condition, causes
+from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
+from surefix.service.judgement import judge_sensors
 from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.recorder import Recorder
+from surefix.service.sensors import SensorState
 from surefix.service.station import (
+    Ahead,
     Latest,
     Station,
     begin_station,
-    latest,
+    look_ahead,
     receive,
     resumed,
     stored,
 )
+from surefix.service.steady import SteadyClock
 from surefix.types import Cleaned
 
-__all__ = ["Live", "begin_live", "run_live", "step"]
+__all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
 _DRAIN: Final = 0.01  # s: at the end, what has arrived is taken, and nothing waited for
-_STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
 
 @dataclass
@@ -54,12 +63,22 @@ class Live:
         Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
-    lines, outputs
+    lines, outputs, recorders
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
+    unwritten
+        What was received and told since the journal was last written.
+    sensors
+        How each is judged.
     alarms
-        What is wrong at present, by what it concerns.
+        Those that are open, and those that were closed not long ago.
+    set_by
+        s by which the computer's clock was set since the service began.
+    history
+        The last rows that were cleaned for good; as many as the web side keeps.
+    watchers
+        Told of every step after what it led to is out, with what it took in.
     """
 
     options: LiveOptions
@@ -68,12 +87,26 @@ class Live:
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
+    recorders: list[Recorder] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
-    alarms: dict[str, str] = field(default_factory=dict)
+    unwritten: list[Received | Told] = field(default_factory=list)
+    sensors: tuple[SensorState, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
+    set_by: float = 0.0
+    ahead: Ahead | None = None
+    fixed_at: tuple[float, float] = (math.nan, math.nan)  # validity of the last row, and when seen
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    shed_at: float = -math.inf
+    history: History = field(default_factory=lambda: History(0))
+    watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
+
+    @property
+    def unsaved(self) -> list[Received | Told]:
+        """What the journal has not got yet, the oldest first."""
+        return [*self.keeper.waiting, *self.unwritten]
 
 
 def begin_live(options: LiveOptions) -> Live:
@@ -85,7 +118,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.role) for each in options.inputs])
+    journal.begin([(each.name, each.task) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -93,13 +126,26 @@ def begin_live(options: LiveOptions) -> Live:
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
+    files = [each.address.path for each in options.outputs if each.address.kind == "file"]
+    recorders = [Recorder(Path(path), station.rows) for path in files]
     for piece in journal.received(station.after):
-        station, _ = receive(station, [piece])
+        station, batches = receive(station, [piece])
+        for recorder in recorders:
+            recorder.add(batches)
+    for recorder in recorders:
+        recorder.ready()
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
     for source, size in _replayed(options, journal).items():
         lines[source].size = size
-    return Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
+    live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live.recorders, live.alarms = recorders, known
+    if options.web is not None:
+        live.history = History(options.web.history_rows)
+        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
+        live.history.sensors = station.session.sensors
+    return live
 
 
 def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
@@ -109,38 +155,56 @@ def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
 
 
 async def run_live(
-    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] = time.time
+    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] | None = None
 ) -> None:
     """Serve until ``stop`` is set, or all inputs are recorded logs that have ended.
+
+    Without a ``clock`` it is one that does not step when the computer's clock is set.
 
     Raises
     ------
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox = Inbox()
+    inbox, steady, web = Inbox(), SteadyClock(), None
+    clock = clock or steady
     try:
+        if live.options.web is not None:
+            from surefix.service.web_server import open_web
+
+            web = open_web(live, live.options.web, clock)
         for wanted in live.options.outputs:
-            live.outputs.append((wanted, await open_output(wanted.address)))
+            if wanted.address.kind != "file":
+                live.outputs.append((wanted, await open_output(wanted.address)))
+        _gaps(live)
         async with asyncio.TaskGroup() as tasks:
             reading = [
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
                 for i, each in enumerate(live.options.inputs)
             ]
+            if web is not None:
+                live.watchers.append(web.notice)
+                tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
-                await _write(live, _noticed(live, inbox))
+                _noticed(live, inbox, clock())
+                live.set_by = steady.set_by if clock is steady else 0.0
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
-            await step(live, await inbox.take(_DRAIN), clock())
+            if arrived := await inbox.take(_DRAIN):
+                await step(live, arrived, clock())
+            if web is not None:
+                web.stop()
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
-        await _write(live, whole=True)
+        await _write(live, clock(), whole=True)
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
+        for recorder in live.recorders:
+            recorder.close()
 
 
 async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
@@ -150,7 +214,11 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         live.taken += 1
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
+    for recorder in live.recorders:
+        recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
+    if live.options.web is not None and len(rows := live.history.add(batches)):
+        told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
@@ -160,18 +228,87 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
             text = sentences(epoch, talker=wanted.talker, types=wanted.sentences)
             told.append(_told(live, known.time, "nmea", text.decode("ascii")))
             fresh.append((output, text))
-    await _write(live, [*received, *told])
+    live.unwritten += [*received, *told]
+    _judge(live, now)
+    trouble = live.keeper.trouble
+    await _write(live, now)
+    if live.keeper.trouble != trouble:
+        _heed(live, now)
     for output, text in fresh:
         output.send(text)
+    for watch in live.watchers:
+        watch(arrived)
+
+
+def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
+    """Tell that a person has seen an alarm; False if there is none of that number to be seen.
+
+    The journal has it with the next step, a second later at most.
+
+    Parameters
+    ----------
+    live
+        The service.
+    number
+        Of the alarm.
+    by
+        Who has seen it.
+    now
+        s, Unix.
+    """
+    before = live.alarms
+    _set_alarms(live, alarm.acknowledged(before, number, by, now), now)
+    return live.alarms != before
+
+
+def _judge(live: Live, now: float) -> None:
+    """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
+    session = live.station.session if live.ahead is None else live.ahead.session
+    inputs = [(each.name, each.role) for each in live.options.inputs]
+    at = math.nan if _recorded(live) else now
+    live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
+    _heed(live, now)
+
+
+def _heed(live: Live, now: float) -> None:
+    """Raise alarms for what is wrong, and clear those whose cause is gone."""
+    condition = Condition(now, live.now, live.keeper.trouble, live.shed_at, live.set_by)
+    found = causes(live.sensors, condition, live.options.alarms)
+    _set_alarms(live, alarm.up_to_date(live.alarms, found, now), now)
+
+
+def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
+    """Take over alarms, and tell the journal of those that are not what they were."""
+    for each in alarm.changed(live.alarms, after):
+        live.unwritten.append(_told(live, now, "alarm", alarm.as_text(each)))
+    live.alarms = after
+
+
+def _gaps(live: Live) -> None:
+    """Say of each recorded track which rows it will never have."""
+    for each in live.recorders:
+        if each.missing:
+            text = f"note: {each.place} lacks {each.missing} rows before these"
+            live.unwritten.append(_told(live, math.nan, "event", text))
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
-    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick."""
-    known = latest(live.station) if fresh else None
+    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick.
+
+    Dead reckoning goes on from the last row by the time that has passed since it was seen, so that
+    a clock of this computer that is wrong does no harm.
+    """
+    known = None
+    if fresh:
+        live.ahead = look_ahead(live.station)
+        known = live.ahead.shown
+    if known is not None and not known.time <= live.fixed_at[0]:
+        live.fixed_at = known.time, now
     behind = live.now is not None and (known is None or known.time <= live.now.time)
     if not behind or now - live.shown_at < _TICK or _recorded(live):
         return known
-    return latest(live.station, now)
+    newest, seen = live.fixed_at
+    return look_ahead(live.station, newest + now - seen).shown
 
 
 def _recorded(live: Live) -> bool:
@@ -194,7 +331,7 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
 
 def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
-        return Epoch(known.time, known=False)
+        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
     latitude, longitude, height = known.geodetic
     east, north, _ = known.velocity
     sigma_east, sigma_north, sigma_up = known.sigma_position
@@ -208,7 +345,9 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
-        known=known.time - known.observed <= _STALE,
+        heading=known.heading,
+        depth=known.depth,
+        known=not known.dead_reckoned,
     )
 
 
@@ -224,38 +363,38 @@ async def _next(inbox: Inbox, stop: asyncio.Event) -> list[Arrived]:
     return taking.result() if taking in done else []
 
 
-def _noticed(live: Live, inbox: Inbox) -> list[Told]:
+def _noticed(live: Live, inbox: Inbox, now: float) -> None:
     """Say that more came than could be taken."""
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
-        live.alarms["load"], inbox.shed = text, 0
-        return [_told(live, math.nan, "alarm", text)]
-    return []
+        live.unwritten.append(_told(live, now, "event", f"overload: {text}"))
+        live.shed_at, inbox.shed = now, 0
 
 
-async def _write(
-    live: Live, records: Sequence[Received | Told] = (), *, whole: bool = False
-) -> None:
+async def _write(live: Live, now: float, *, whole: bool = False) -> None:
     """Write what is not written yet, and a snapshot if it is time; without success, keep it."""
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
+    keeper, records = live.keeper, live.unwritten
+    live.unwritten = []
     snapshot = None
     if live.station.session.setup is not None and (whole or (due and records)):
 
         def snapshot() -> tuple[int, bytes]:
             live.stored_at = time.monotonic()
+            for recorder in live.recorders:  # a snapshot knows of no row that is not recorded
+                recorder.flush()
             return live.station.after, stored(live.station)
 
-    keeper = live.keeper
-    if await keeper.keep(records, snapshot, last=whole):
-        if live.alarms.pop("journal", None) is not None and keeper.gap.pieces:
-            gap, keeper.gap = keeper.gap, Gap()
-            await keeper.keep([_told(live, math.nan, "alarm", _missing(gap))], last=whole)
-    else:
-        live.alarms["journal"] = keeper.trouble
+    if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:
+        gap, keeper.gap = keeper.gap, Gap()
+        known = alarm.raised(live.alarms, "mission", "warning", _missing(gap), now)
+        _set_alarms(live, alarm.cleared(known, "mission", now), now)
+        if whole:
+            await keeper.keep(live.unwritten, last=True)
 
 
 def _missing(gap: Gap) -> str:
-    text = f"the journal was away: {gap.size} bytes of the mission are not in it"
+    text = f"gap: the journal was away, {gap.size} bytes of the mission are not in it"
     if math.isnan(gap.first):
         return text
     first, last = (f"{datetime.fromtimestamp(at, UTC):%Y-%m-%dT%H:%M:%SZ}" for at in gap[2:])

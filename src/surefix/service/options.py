@@ -16,8 +16,18 @@
     sentences = ["GGA", "RMC", "VTG", "GST"]
     talker = "GP"
 
+    [[output]]
+    to = "file:track.csv"             # the clean track, recorded; or .parquet
+
     [journal]
     url = "sqlite:///mission.db"
+
+    [alarms]
+    position_sigma_m = 10.0           # σ above which the position is called uncertain
+    dead_reckoning_s = 10.0           # time without a fix after which it is called lost
+
+    [web]                             # see surefix.service.web_options
+    address = "127.0.0.1:8000"
 """
 
 from __future__ import annotations
@@ -34,8 +44,9 @@ from surefix.io.toml_file import read_toml
 from surefix.io.write_nmea import TYPES
 from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
+from surefix.service.web_options import WebOptions, read_web
 
-__all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
+__all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
 SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
@@ -60,6 +71,9 @@ class InputOptions:
         Networks that datagrams and clients may come from; empty: any.
     require_checksum
         False accepts sentences without one.
+    target
+        Of an acoustic positioning system: the transponder whose sightings are the fixes, or
+        ``first``, the one that is heard first; None, or ``ship``: the fixes are the receivers'.
     """
 
     name: str
@@ -67,6 +81,7 @@ class InputOptions:
     role: str = "fixes"
     allow: tuple[str, ...] = ()
     require_checksum: bool = True
+    target: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -80,6 +95,15 @@ class InputOptions:
                 raise OptionsError(f"allow {network!r} of {self.name}", "a network") from error
         if not isinstance(self.require_checksum, bool):
             raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
+        if self.target is not None and (not isinstance(self.target, str) or not self.target):
+            raise OptionsError(f"target {self.target!r}", "the name of a transponder, or first")
+        if self.target is not None and self.role != "fixes":
+            raise OptionsError(f"target of {self.name}, a source of {self.role}", "role fixes")
+
+    @property
+    def task(self) -> str:
+        """Its role and target, as the journal has them."""
+        return self.role if self.target is None else f"{self.role} of {self.target}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,13 +115,13 @@ class OutputOptions:
     address
         Where it goes to.
     sentences
-        Some of ``SENTENCES``.
+        Some of ``SENTENCES``; HDT and DPT go out where a heading, a depth is known.
     talker
         Two letters that the sentences begin with.
     """
 
     address: Address
-    sentences: tuple[str, ...] = ("GGA", "RMC", "VTG", "GST")
+    sentences: tuple[str, ...] = TYPES
     talker: str = "GP"
 
     def __post_init__(self) -> None:
@@ -106,6 +130,30 @@ class OutputOptions:
                 raise OptionsError(f"sentence {name!r}", "one of " + ", ".join(SENTENCES))
         if not isinstance(self.talker, str) or not _TALKER.fullmatch(self.talker):
             raise OptionsError(f"talker {self.talker!r}", "two capital letters")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlarmOptions:
+    """When the position is no longer to be relied on.
+
+    Parameters
+    ----------
+    position_sigma_m
+        Horizontal standard deviation above which it is uncertain, m.
+    dead_reckoning_s
+        Time without a fix that was used, s, after which it is lost. The default is the time within
+        which IMO A.1046(27) wants to be warned.
+    """
+
+    position_sigma_m: float = 10.0
+    dead_reckoning_s: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("position_sigma_m", "dead_reckoning_s"):
+            value = getattr(self, name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not value > 0.0:
+                raise OptionsError(f"{name} = {value!r}", "a number above 0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +170,10 @@ class LiveOptions:
         URL of the journal.
     snapshot_s
         Time between two snapshots, s.
+    alarms
+        When alarms are raised.
+    web
+        Dashboard and API; None: none.
     """
 
     clean: CleanOptions
@@ -129,6 +181,8 @@ class LiveOptions:
     outputs: tuple[OutputOptions, ...] = ()
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
+    alarms: AlarmOptions = AlarmOptions()
+    web: WebOptions | None = None
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -162,12 +216,15 @@ def read_live(path: str | Path) -> LiveOptions:
     if given.setdefault("mode", "realtime") != "realtime":
         raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
     journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    alarms = _table(place, content, "alarms", {"position_sigma_m", "dead_reckoning_s"})
     if (url := journal.get("url")) is not None:
         journal["url"] = _beside(place, str(url))
     return LiveOptions(
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
+        alarms=AlarmOptions(**alarms),
+        web=_web(place, content),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
 
@@ -191,6 +248,15 @@ def _table(place: Path, content: dict[str, Any], name: str, keys: set[str]) -> d
     return dict(table)
 
 
+def _web(place: Path, content: dict[str, Any]) -> WebOptions | None:
+    table = content.get("web")
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise OptionsError(f"{place}: web = {table!r}", "a table [web]")
+    return read_web(place, table)
+
+
 def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any]]:
     tables = content.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -199,7 +265,9 @@ def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any
 
 
 def _input(place: Path, table: dict[str, Any]) -> InputOptions:
-    rest = _known(place, "input", table, {"name", "from", "role", "allow", "require_checksum"})
+    rest = _known(
+        place, "input", table, {"name", "from", "role", "allow", "require_checksum", "target"}
+    )
     if "name" not in rest or "from" not in rest:
         raise OptionsError(f"{place}: an input without name or from", "both")
     where = address(str(rest.pop("from")), INPUTS)
@@ -212,7 +280,12 @@ def _output(place: Path, table: dict[str, Any]) -> OutputOptions:
     rest = _known(place, "output", table, {"to", "sentences", "talker"})
     if "to" not in rest:
         raise OptionsError(f"{place}: an output without to", "an address")
-    return OutputOptions(address=address(str(rest.pop("to")), OUTPUTS), **rest)
+    where = address(str(rest.pop("to")), OUTPUTS)
+    if where.kind == "file":
+        if rest:
+            raise OptionsError(f"{place}: {min(rest)!r} of a recorded track", "only to")
+        where = where._replace(path=str(place.parent / where.path))
+    return OutputOptions(address=where, **rest)
 
 
 def _known(place: Path, name: str, table: dict[str, Any], keys: set[str]) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""The dashboard: small modules for the browser, served as they are."""

@@ -1,0 +1,60 @@
+// Alarms: what is wrong, and the button that tells the service it was seen.
+
+import { keyed, make, say } from "./build.js";
+import { ask } from "./link.js";
+import { known } from "./rows.js";
+import { clock } from "./words.js";
+
+const SIGNS = { alarm: "▲", warning: "◆", caution: "●" };
+
+const acknowledge = async (number, button) => {
+  const note = document.getElementById("alarm-note");
+  if (button.getAttribute("aria-busy") === "true") return;
+  button.setAttribute("aria-busy", "true");
+  try {
+    await ask(`/api/alarms/${number}/acknowledge`, { method: "POST" });
+    say(note, "");
+  } catch (error) {
+    say(note, error.message);
+  }
+  button.removeAttribute("aria-busy");
+};
+
+const begin = (alarm) => {
+  const item = make("li.alarm");
+  const words = make("div");
+  words.append(make("b.priority"), make("span.text"), make("small"));
+  const button = make("button", "Acknowledge", { type: "button" });
+  button.addEventListener("click", () => acknowledge(alarm.number, button));
+  item.append(make("span.sign", "", { "aria-hidden": "true" }), words, button);
+  return item;
+};
+
+const fill = (item, alarm, role) => {
+  const seen = known(alarm.seen);
+  const gone = known(alarm.gone);
+  item.dataset.priority = alarm.priority;
+  item.dataset.seen = String(seen);
+  say(item.querySelector(".sign"), SIGNS[alarm.priority] ?? "");
+  say(item.querySelector(".priority"), alarm.priority);
+  say(item.querySelector(".text"), `${alarm.concerns}: ${alarm.text}`);
+  const ended = gone ? `over since ${clock(alarm.gone)}` : "lasts";
+  const by = seen ? `, acknowledged ${clock(alarm.seen)} by ${alarm.by}` : "";
+  say(item.querySelector("small"), `since ${clock(alarm.since)}, ${ended}${by}`);
+  const button = item.querySelector("button");
+  button.setAttribute("aria-label", `Acknowledge ${alarm.concerns}: ${alarm.text}`);
+  button.title = role === "operator" ? "" : "Only operators may";
+  button.disabled = role !== "operator";
+  if (seen && document.activeElement === button) item.parentElement.parentElement.focus();
+  button.hidden = seen;
+};
+
+/** Show the alarms of a record; `role` is who looks. */
+export const showAlarms = (alarms, role) => {
+  const open = alarms.filter((alarm) => !known(alarm.seen)).length;
+  document.getElementById("no-alarms").hidden = alarms.length > 0;
+  document.getElementById("alarms").dataset.open = String(open);
+  document.title = open ? `(${open}) surefix live` : "surefix live";
+  const list = document.getElementById("alarm-list");
+  keyed(list, alarms, (alarm) => alarm.number, begin, (item, alarm) => fill(item, alarm, role));
+};
