@@ -107,7 +107,7 @@ async def _connected(port):
     raise AssertionError(port)
 
 
-def main(sentences=4_300_000, block=400):
+def main(sentences=4_300_000, block=2000):
     """Soak, and print what the memory was."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -48,7 +48,6 @@ from surefix.types import Cleaned
 __all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
-_DRAIN: Final = 0.01  # s: at the end, what has arrived is taken, and nothing waited for
 
 
 @dataclass
@@ -192,8 +191,7 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
-            if arrived := await inbox.take(_DRAIN):
-                await step(live, arrived, clock())
+            await step(live, await inbox.take(0.01), clock())  # what has arrived is not lost
             if web is not None:
                 web.stop()
     except* (InputError, OutputError) as group:
