@@ -32,6 +32,8 @@ def live(
     from surefix.service.options import read_live
 
     service = begin_live(read_live(options))
+    if service.journal.aside:
+        typer.echo(f"the journal was damaged: it is kept as {service.journal.aside}", err=True)
     for line in service.lines:
         typer.echo(f"from {line.address}")
     for output in service.options.outputs:

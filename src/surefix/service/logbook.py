@@ -48,6 +48,8 @@ class Logbook:
         self._alarms = live.alarms
         self._settled = False
         self._say("info", "start", "service", f"after {live.taken} pieces in the journal")
+        if live.journal.aside:
+            self._say("error", "damaged", "journal", f"put aside as {live.journal.aside}")
 
     def note(self) -> None:
         """Write what has changed."""
