@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from surefix.filters.hypotheses import DROP, POOR, RESTARTS, WALK, Bank, Prior
-from surefix.filters.hypothesis_density import log_normal, wrapped
+from surefix.filters.hypothesis_density import best_of, log_normal, wrapped
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -80,9 +80,7 @@ def _supported(prior: Prior, bank: Bank, a: int, c: int, time: float, sensor: in
 
 
 @lean_helper
-def dragged_axes(
-    prior: Prior, bank: Bank, k: int, z: FloatArray, time: float, sensor: int
-) -> int:
+def dragged_axes(prior: Prior, bank: Bank, k: int, z: FloatArray, time: float, sensor: int) -> int:
     """Axes of a fix that velocities or another sensor support, as bits."""
     mask, d = 0, bank.seen.shape[1]
     for a in range(d):
@@ -108,14 +106,12 @@ def supposes(prior: Prior, bank: Bank, place: IntArray, sensor: int) -> int:
     """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1."""
     if not prior.drag > 0.0 or len(place) < _PACE:
         return -1
-    first = -1
     for i in range(bank.number[0]):
         k = place[i]
         if bank.walks[k] and bank.run[k] == sensor and bank.length[k] < _PACE:
             return -1
-        if first < 0 and bank.run[k] < 0 and bank.faulty[k] == 0:
-            first = i
-    return first
+    best = best_of(bank.weight, bank.number[0])
+    return best if bank.run[place[best]] < 0 and bank.faulty[place[best]] == 0 else -1
 
 
 @lean_helper
