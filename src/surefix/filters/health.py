@@ -44,6 +44,8 @@ class Health(NamedTuple):
         (s,) whether the sensor fell and did not rise since.
     scale
         (s,) ratio of its noise to what was settled, as last told.
+    dragged
+        (s,) whether its last fix was in a drag.
     """
 
     seen: IntArray
@@ -52,6 +54,7 @@ class Health(NamedTuple):
     square: FloatArray
     suspect: BoolArray
     scale: FloatArray
+    dragged: BoolArray
 
 
 def no_health(sensors: int) -> Health:
@@ -63,6 +66,7 @@ def no_health(sensors: int) -> Health:
         np.ones(sensors),
         np.zeros(sensors, np.bool_),
         np.ones(sensors),
+        np.zeros(sensors, np.bool_),
     )
 
 

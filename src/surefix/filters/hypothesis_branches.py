@@ -331,7 +331,7 @@ def position_branches(
             parent[total], code[total] = i, says
             total += 1
         strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
-        if strange and not unknown:
+        if strange and not unknown and bank.length[k] >= CONFIRMED and bank.faulty[k] == 0:
             dragged = dragged_axes(prior, bank, k, z, time, sensor)
             if dragged:
                 score[total] = base + outside + burst
