@@ -153,7 +153,8 @@ class NmeaStream:
         """Sightings that wait until the ship's position at their time is known; as `begun`."""
         if self._sightings is None:
             return []
-        return [(f"{self._path.stem} {n}", *rest) for n, *rest in self._sightings.waiting()]
+        told = self._sightings.waiting()
+        return [(f"{self._path.stem} {name}", n, t, ok) for name, n, t, ok in told]
 
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
