@@ -14,7 +14,7 @@ ONLY_SPARK := pyspark py4j
 COMPILE := --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
   --custom-compile-command 'make lock'
 
-.PHONY: help demo test lint format lock bench clean
+.PHONY: help demo test lint format lock bench fuzz kills soak clean
 .DEFAULT_GOAL := help
 
 help:
@@ -23,6 +23,9 @@ help:
 	@echo 'make lint    check style, types and layers only'
 	@echo 'make format  put the code into its style'
 	@echo 'make bench   time surefix beside its peers, and write docs/benchmarks.*'
+	@echo 'make kills   kill the live service a thousand times'
+	@echo 'make fuzz    read ten million mutated sentences'
+	@echo 'make soak    take 4.3 million sentences through the live service'
 	@echo 'make lock    resolve the dependencies anew into requirements.lock'
 	@echo 'make clean   remove what make made'
 
@@ -51,6 +54,16 @@ lock: $(INSTALLED)
 	  --output-file requirements.lock pyproject.toml -
 	printf '%s\n' $(ONLY_SPARK) | $(BIN)/uv pip compile $(COMPILE) --upgrade \
 	  --constraint requirements.lock --output-file requirements-spark.lock -
+
+# Long forms of tests that `make test` runs a part of; what they found is in docs/live.md.
+kills: $(INSTALLED)
+	PYTHONPATH=tests NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m service.kills
+
+fuzz: $(INSTALLED)
+	PYTHONPATH=tests NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m faults.fuzz
+
+soak: $(INSTALLED)
+	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python bench/soak.py
 
 # Peers live in an environment of their own, and one that cannot be installed is left out.
 bench: $(BENCH)/.installed

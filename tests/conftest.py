@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import cluster
+
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -15,3 +17,9 @@ def data() -> Path:
     if not folder.is_dir():
         pytest.skip("no recorded logs: set SUREFIX_DATA to their folder to run this test")
     return folder
+
+
+@pytest.fixture(scope="session")
+def postgres():
+    """A PostgreSQL server of our own; the test is skipped where it is not installed."""
+    yield from cluster.cluster()

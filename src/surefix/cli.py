@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +29,7 @@ from surefix.cli_inputs import (
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_signals import obey
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
@@ -44,11 +44,15 @@ app = typer.Typer(
 )
 
 _INTERRUPTED = 130
-_TERMINATED = 143
 _SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
-    list[Path], typer.Argument(help="Logs: CSV, Parquet or NMEA 0183.", show_default=False)
+    list[str],
+    typer.Argument(
+        help="Logs: CSV, Parquet, NMEA 0183, or the journal of a live service, a file or a URL.",
+        show_default=False,
+        metavar="INPUTS...",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
@@ -188,7 +192,8 @@ def clean(
         _delays(sensor_delay or []),
     )
     check_report(report)
-    files = [path for path in (*inputs, depth, velocity, heading, options) if path is not None]
+    given = (*inputs, depth, velocity, heading, options)
+    files = [Path(path) for path in given if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
@@ -227,7 +232,7 @@ def info(
     from surefix.io.columns import mapping
     from surefix.pipelines.info import describe, info_lines
 
-    files = [path for path in (*inputs, depth, velocity, heading) if path is not None]
+    files = [Path(path) for path in (*inputs, depth, velocity, heading) if path is not None]
     with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
@@ -297,7 +302,7 @@ app.command()(warmup)
 def main() -> None:
     """Run the command line; every failure ends with one line and a non-zero exit."""
     _use_utf8()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))  # unfinished files are removed
+    obey()
     try:
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:

@@ -67,10 +67,11 @@ def test_memory_is_bounded_in_real_time(tmp_path):
     """Twice the log, the same memory: nothing is kept but what the filter carries.
 
     The bound holds the libraries (some 250 MB), the head, a block of text and its rows, and what
-    is kept for the figures of the summary.
+    is kept for the figures of the summary. A short log goes before, which compiles the kernels:
+    that takes some 100 MB of its own.
     """
     peaks = {}
-    for blocks in (10, 20):
+    for blocks in (1, 10, 20):
         path, out = tmp_path / "log.csv", tmp_path / "out.csv"
         generate(path, blocks)
         peaks[blocks] = peak_mb(path, out)
@@ -78,5 +79,5 @@ def test_memory_is_bounded_in_real_time(tmp_path):
             assert sum(1 for _ in file) == blocks * BLOCK + 1
         path.unlink()
         out.unlink()
-    assert max(peaks.values()) < 700, peaks
+    assert max(peaks[10], peaks[20]) < 620, peaks
     assert peaks[20] - peaks[10] < 100, peaks

@@ -5,6 +5,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -151,6 +152,40 @@ def test_interrupted(long_log, out, mode, number):
         assert err == "surefix: interrupted\n"
         assert said == ""
     untouched(out)
+
+
+STOPPED_WHILE_FINALISING = """
+import signal, sys, time
+from surefix import cli
+
+class Last:
+    def __del__(self):
+        signal.raise_signal(int(sys.argv[1]))
+        for _ in range(10):
+            pass
+
+def app(**_):
+    Last()
+    time.sleep(5.0)
+
+cli.app = app
+cli.main()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_is_not_lost_where_exceptions_are_dropped(number, code):
+    """The interpreter drops what is raised while an object is finalised."""
+    command = [sys.executable, "-c", STOPPED_WHILE_FINALISING, str(int(number))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == code
+    assert done.stderr == ("surefix: interrupted\n" if number == signal.SIGINT else "")
+
+
+def test_python_dash_m():
+    command = [sys.executable, "-m", "surefix", "--version"]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
 def test_an_older_output_is_replaced_whole(log, out):

@@ -333,7 +333,7 @@ def test_ugps_dive(data: Path) -> None:
 
 def test_ugps_raw(data: Path) -> None:
     (file,) = (data / "usbl_ugps_raw").glob("*acoustic.csv")
-    log = read(file)
+    log = read(file, chunk=1 << 24)
     assert (len(fixes(log).valid), int((~fixes(log).valid).sum())) == (7168, 2684)
     (file,) = (data / "usbl_ugps_raw").glob("*HDT.csv")
     assert read(file, role="heading").channels[0].value[0] == 53.9

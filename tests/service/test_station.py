@@ -35,7 +35,7 @@ def recorded(n=150, seed=1):
     rng = np.random.default_rng(seed)
     lines = []
     for k in range(n):
-        clock = f"12{k // 60:02d}{k % 60:02d}.00"
+        clock = f"{12 + k // 3600:02d}{k // 60 % 60:02d}{k % 60:02d}.00"
         north, east = rng.normal(0.0, 1e-5, 2) + (4e-4 if rng.random() < 0.08 else 0.0)
         lat, lon = minutes(54.0 + 2e-5 * k + north, 2), minutes(10.0 + 1e-5 * k + east, 3)
         place = f"{lat},N,{lon},E"

@@ -80,6 +80,7 @@ def repair(
     *,
     final: bool,
     window: float = REORDER_WINDOW,
+    reached: float = -math.inf,
 ) -> tuple[Repaired, ClockState, tuple[Event, ...]]:
     """Repair the order and the clock of the next rows of a log.
 
@@ -112,6 +113,8 @@ def repair(
         True with the last chunk, which may be empty: nothing is held back any more.
     window
         Reorder window, s.
+    reached
+        tau up to which rows are let go although an earlier one of this log may still arrive.
     """
     rows = _join(state.held, time, place, row)
     timed = np.flatnonzero(np.isfinite(rows.time[state.decided :])) + state.decided
@@ -119,7 +122,8 @@ def repair(
     decided = int(timed[done]) if done < timed.size else rows.time.size
     highest = _place_keys(rows, slice(state.decided, decided), state.highest)
     release = np.zeros(rows.time.size, dtype=np.bool_)
-    release[:decided] = final | (rows.key[:decided] <= (clock.top - window) + clock.offset)
+    until = max((clock.top - window) + clock.offset, reached)
+    release[:decided] = final | (rows.key[:decided] <= until)
     order, held = np.flatnonzero(release), np.flatnonzero(~release)
     key = rows.key[order]
     if np.any(key[1:] < key[:-1]):

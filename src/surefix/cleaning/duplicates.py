@@ -17,7 +17,15 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["RepeatState", "Repeats", "constant_axes", "find_repeats", "idle_axes", "start_repeats"]
+__all__ = [
+    "RepeatState",
+    "Repeats",
+    "constant_axes",
+    "find_repeats",
+    "idle_axes",
+    "start_repeats",
+    "stuck",
+]
 
 _GRAINS = 4.0  # a hold is believed where positions usually change by at least so many grains
 _COPIES = 10  # copies on end that are believed to be held; a vessel may have come to rest
@@ -171,6 +179,20 @@ def idle_axes(
     if geographic:
         idle[:, :2] &= idle[:, :2].all(axis=1, keepdims=True)
     return idle
+
+
+def stuck(state: RepeatState) -> tuple[FloatArray, BoolArray]:
+    """Tell which sensors give the same position again and again.
+
+    Returns
+    -------
+    since, lively
+        (sensors,) since when each does, s, NaN where it does not; and whether coarse digits cannot
+        explain it, because it usually changes by many of them.
+    """
+    since = np.array([past.since if past.copies else np.nan for past in state.sensors])
+    lively = [past.polled or np.median(past.changes) >= _GRAINS for past in state.sensors]
+    return since, np.array(lively, dtype=np.bool_)
 
 
 def _learn(position: FloatArray) -> _Sensor:

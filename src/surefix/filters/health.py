@@ -27,6 +27,7 @@ _LONG_MEMORY = 200.0  # … and in the noise
 _FALLS, _RISES = 0.5, 0.2  # shares of those left out at which a sensor falls and rises
 _RATIO = 2.0  # ratio of standard deviations that is told
 _LARGEST = 16.0  # no single squared innovation counts for more
+_MOST = _LARGEST**0.5
 
 
 class Health(NamedTuple):
@@ -40,6 +41,9 @@ class Health(NamedTuple):
         (s,) share left out of the last ones.
     square
         (s,) mean square of the standardised innovations of those used.
+    lean
+        (s, 3) mean of the standardised innovations of all that were judged, signed: a sensor that
+        is right leans to no side, one that is biased against the others does. NaN before the first.
     suspect
         (s,) whether the sensor fell and did not rise since.
     scale
@@ -50,6 +54,7 @@ class Health(NamedTuple):
     used: IntArray
     rejected: FloatArray
     square: FloatArray
+    lean: FloatArray
     suspect: BoolArray
     scale: FloatArray
 
@@ -61,13 +66,18 @@ def no_health(sensors: int) -> Health:
         np.zeros(sensors, np.int64),
         np.zeros(sensors),
         np.ones(sensors),
+        np.full((sensors, 3), np.nan),
         np.zeros(sensors, np.bool_),
         np.ones(sensors),
     )
 
 
 def watch(
-    health: Health, sensor: IntArray, out: BoolArray, square: FloatArray
+    health: Health,
+    sensor: IntArray,
+    out: BoolArray,
+    square: FloatArray,
+    standardised: FloatArray | None = None,
 ) -> tuple[Health, IntArray, FloatArray]:
     """Go on with the record of each sensor; ``health`` is not modified.
 
@@ -79,6 +89,8 @@ def watch(
         (n,) which sensor an observation came from, and whether it was left out.
     square
         (n,) mean square of its standardised innovations; NaN is left aside.
+    standardised
+        (n, 3) the innovations themselves; NaN is left aside. None: they are not known.
 
     Returns
     -------
@@ -89,7 +101,9 @@ def watch(
     after = Health._make(field.copy() for field in health)
     what = np.zeros(len(sensor), np.int64)
     figure = np.full(len(sensor), np.nan)
-    _watch(after, sensor, out, square, what, figure)
+    if standardised is None:
+        standardised = np.full((len(sensor), 3), np.nan)
+    _watch(after, sensor, out, square, standardised, what, figure)
     return after, what, figure
 
 
@@ -99,6 +113,7 @@ def _watch(
     sensor: IntArray,
     out: BoolArray,
     square: FloatArray,
+    standardised: FloatArray,
     what: IntArray,
     figure: FloatArray,
 ) -> None:
@@ -107,6 +122,12 @@ def _watch(
         health.seen[s] += 1
         gain = 1.0 / min(float(health.seen[s]), _MEMORY)
         health.rejected[s] += gain * ((1.0 if out[k] else 0.0) - health.rejected[s])
+        for i in range(3):
+            z = standardised[k, i]
+            if not np.isnan(z):
+                z = min(max(z, -_MOST), _MOST)
+                before = health.lean[s, i]
+                health.lean[s, i] = z if np.isnan(before) else before + gain * (z - before)
         if health.seen[s] < _MEMORY:
             continue
         share = health.rejected[s]

@@ -90,6 +90,18 @@ class Epochs:
         """Complete rows."""
         return len(self._marks) // _MARKS
 
+    def begun(self) -> list[tuple[str, int, float, bool]]:
+        """Give the rows that may still grow: source, number, time, whether there is a position."""
+        return [
+            (row.source, row.number, row.time, row.valid and not isnan(row.latitude))
+            for row in self._open
+        ]
+
+    def settle(self, before: float) -> None:
+        """Complete the rows that began before a time."""
+        while self._open and self._open[0].time < before:
+            self._close(self._open.popleft())
+
     def add(self, record: Position, time: float, received: float) -> None:
         """Put a position sentence into its row, or begin one.
 

@@ -108,6 +108,13 @@ class NmeaStream:
         """Rows that a chunk would hold, or their equivalent in samples."""
         return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
 
+    @property
+    def begun(self) -> list[tuple[str, int, float, bool]]:
+        """Fixes that are not given out yet: sensor, number, time, and whether it has a position."""
+        if not isinstance(self._epochs, Epochs) or not self._clock.dated:
+            return []
+        return [(f"{self._path.stem} {name}", n, t, ok) for name, n, t, ok in self._epochs.begun()]
+
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
 
@@ -126,6 +133,12 @@ class NmeaStream:
         if self._clock.dated or self.size >= _UNDATED:
             return self.chunk()
         return Log(source=str(self._path))
+
+    def settle(self, before: float) -> Log:
+        """Give the fixes that began before a time, although a sentence may still belong to them."""
+        if isinstance(self._epochs, Epochs):
+            self._epochs.settle(before)
+        return self.chunk()
 
     def rest(self) -> Log:
         """Read the line without an end, if there is one, and give all rows."""

@@ -25,12 +25,8 @@ from surefix.io.toml_file import read_toml
 __all__ = ["OptionsFile", "read_options"]
 
 _TABLES = ("clean", "columns", "sensor")
-_LIVE = (
-    "input",
-    "output",
-    "journal",
-    "web",
-)  # of surefix live, whose file holds for surefix clean too
+# Of surefix live, whose file holds for surefix clean too:
+_LIVE = ("alarms", "input", "journal", "output", "web")
 _SENSOR_KEYS = ("delay_s", "sigma")
 
 

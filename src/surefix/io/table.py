@@ -24,7 +24,7 @@ from surefix.types import Log
 
 __all__ = ["from_frame", "read_table"]
 
-CHUNK = 1 << 23
+CHUNK = 1 << 21
 """Bytes of text read at a time."""
 
 _ROWS = 1 << 16  # records of a Parquet file read at a time

@@ -8,6 +8,7 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
+from surefix.filters.health import Health, no_health, watch
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis
@@ -24,12 +25,14 @@ from surefix.types import (
     Noise,
     Reason,
     Verdict,
+    Verdicts,
 )
 
 __all__ = ["ChannelState", "channel_head", "clean_channel"]
 
 _HEAD = 2000
 _LAG_VALUES = 20
+_JUDGED = (Verdict.USED, Verdict.DOWNWEIGHTED, Verdict.REJECTED)
 _LITTLE = 0.1  # a value of less weight does not count as support of the clean series …
 _LOST = 20.0  # … which is left open there once its σ exceeds so many σ of the noise
 
@@ -46,6 +49,7 @@ class ChannelState(NamedTuple):
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
     filter: FilterState | None = None
+    health: Health = no_health(1)
 
     def nothing(self) -> Channel:
         """An empty part of the series that was begun."""
@@ -143,7 +147,15 @@ def clean_channel(
         verdicts=judged,
         noise=state.noise,
     )
-    return cleaned, state._replace(filter=after)
+    return cleaned, state._replace(filter=after, health=_watched(state.health, judged))
+
+
+def _watched(health: Health, judged: Verdicts) -> Health:
+    """The record of the sensor after these values."""
+    rows = np.flatnonzero(np.isin(judged.verdict, _JUDGED))
+    square = judged.standardised[rows, 0] ** 2
+    out = judged.verdict[rows] == Verdict.REJECTED
+    return watch(health, np.zeros(len(rows), np.int64), out, square)[0]
 
 
 def _filled(tau: FloatArray) -> FloatArray:

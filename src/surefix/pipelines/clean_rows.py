@@ -12,6 +12,7 @@ from surefix.filters.records import Epochs, Estimate
 from surefix.pipelines.events import jump_events, run_events, sensor_events
 from surefix.pipelines.judge import (
     Status,
+    by_velocity,
     estimate,
     join_status,
     unjudged,
@@ -94,13 +95,21 @@ def _clean(
     session, found = _estimated(replace(session, last_tau=float(tau[-1])), setup, all_rows)
     judged = _judged(setup, all_rows, found)
     track = _track(setup, all_rows, found)
+    row = np.flatnonzero(order < len(tau))
+    health_events, health = sensor_events(
+        Verdicts._make(column[row] for column in judged),
+        track.time[row],
+        rows.fixes.sensor[order[row]],
+        list(sensors),
+        np.ones(len(row)) if found is None else found.scale[row],
+        all_rows.auxiliary[row],
+        session.health,
+    )
 
     fix = np.flatnonzero((order < len(tau)) & ~all_rows.auxiliary)
     mine = take_rows(rows, order[fix])
     judged = Verdicts._make(column[fix] for column in judged)
-    scale = np.ones(len(fix)) if found is None else found.scale[fix]
     told = judged, track.time[fix], mine.fixes.sensor, list(sensors)
-    health_events, health = sensor_events(*told, scale, session.health)
     session = replace(
         session, health=health, held=session.held + int((judged.reason == Reason.HELD).sum())
     )
@@ -155,6 +164,8 @@ def _judged(setup: Setup, all_rows: _Epochs, found: Estimate | None) -> Verdicts
         found, all_rows.epochs, setup.motion, all_rows.status, setup.axes, several=several
     )
     wide, offset = (np.full((len(judged.verdict), 3), np.nan) for _ in range(2))
+    supporting = all_rows.auxiliary & (all_rows.status.verdict < 0)
+    judged = by_velocity(judged, found, setup.motion, supporting, several=several)
     wide[:, list(setup.axes)] = judged.standardised
     offset[:, list(setup.axes)] = judged.offset
     return without_position(judged._replace(standardised=wide, offset=offset), all_rows.lost)

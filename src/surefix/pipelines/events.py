@@ -6,7 +6,7 @@ import numpy as np
 
 from surefix.filters.health import SUSPECT, TRUSTED, Health, no_health, watch
 from surefix.reasons import vector
-from surefix.types import Event, FloatArray, IntArray, Reason, Verdict, Verdicts
+from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
 
 __all__ = ["jump_events", "run_events", "sensor_events"]
 
@@ -63,6 +63,7 @@ def sensor_events(
     sensor: IntArray,
     sensors: list[str],
     scale: FloatArray,
+    supporting: BoolArray,
     health: Health | None,
 ) -> tuple[list[Event], Health]:
     """Sensors that are mostly rejected or noisier than was settled, and those that recover.
@@ -70,9 +71,11 @@ def sensor_events(
     Parameters
     ----------
     judged, time, sensor, sensors
-        As for `run_events`.
+        Of n observations; as for `run_events`.
     scale
         (n,) by how much the variance of each fix was changed since it was settled.
+    supporting
+        (n,) True for observations of a sensor that is no position sensor.
     health
         Of the fixes before these; None at the beginning.
 
@@ -88,17 +91,19 @@ def sensor_events(
     count = known.sum(axis=1)
     square = np.where(count > 0, total.sum(axis=1) / np.maximum(count, 1), np.nan) * scale[rows]
     out = judged.verdict[rows] == Verdict.REJECTED
-    health, what, figure = watch(health, sensor[rows], out, square)
+    lean = judged.standardised[rows] * np.sqrt(scale[rows, None])
+    health, what, figure = watch(health, sensor[rows], out, square, lean)
     events = []
     for i in np.flatnonzero(what).tolist():
         name, at = sensors[sensor[rows[i]]], float(time[rows[i]])
+        seen = "observations" if supporting[rows[i]] else "fixes"
         if what[i] == SUSPECT:
-            text = f"{figure[i]:.0%} of the last fixes of {name} rejected"
+            text = f"{figure[i]:.0%} of the last {seen} of {name} rejected"
             events.append(Event("sensor-suspect", at, text))
         elif what[i] == TRUSTED:
-            text = f"the fixes of {name} agree with the track again"
+            text = f"the {seen} of {name} agree with the track again"
             events.append(Event("sensor-trusted", at, text))
-        else:
+        elif not supporting[rows[i]]:
             text = f"the noise of {name} is {figure[i]:.2g} × what was settled"
             events.append(Event("noise-changed", at, text))
     return events, health

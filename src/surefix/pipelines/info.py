@@ -55,7 +55,7 @@ def describe(
         source._replace(logs=_counting(source.logs, counts.setdefault(source.name, {})))
         for source in sources
     ]
-    size = sum(Path(path).stat().st_size for path in inputs)
+    size = sum(Path(path).stat().st_size for path in inputs if Path(path).exists())
     mode: Mode = "realtime" if size > _LARGE else "offline"
     cleaned = clean_sources(sources, CleanOptions(mode=mode))
     found = summary(cleaned, counts_of(cleaned.verdicts))

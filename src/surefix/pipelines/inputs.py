@@ -28,6 +28,7 @@ Data = Any
 
 Progress = Callable[[int], None]
 _HEAD = 1 << 16
+_JOURNALS = ("postgresql://", "sqlite:///")
 _BODY = ("forward_mps", "starboard_mps", "down_mps")
 _SIGMA = "velocity_sigma_mps"  # standard deviation that a sensor declares for each of them
 
@@ -48,8 +49,8 @@ def open_inputs(
     Parameters
     ----------
     inputs
-        Logs with positions: files (CSV, Parquet or NMEA 0183) or tables (data frames, Arrow
-        tables, mappings of names to arrays).
+        Logs with positions: files (CSV, Parquet, NMEA 0183, the SQLite journal of a live service),
+        URLs of its journals, or tables (data frames, Arrow tables, mappings of names to arrays).
     depth, velocity, heading
         Other sensors, each a file or a table, with their own clocks and rates.
     columns
@@ -75,8 +76,8 @@ def open_inputs(
     opener.check({role for role, data in given.items() if data is not None})
     sources: list[Source] = []
     for data in inputs:
-        if isinstance(data, str | Path) and is_sqlite(Path(data)):
-            sources += _journalled(Path(data), require_checksum)
+        if (journal := _journal(data)) is not None:
+            sources += _journalled(journal, require_checksum)
         else:
             sources.append(Source(opener.open(data, "fixes"), "fixes", _name(data)))
     if depth is not None:
@@ -92,13 +93,20 @@ def open_inputs(
     return sources
 
 
-def _journalled(place: Path, require_checksum: bool) -> list[Source]:
+def _journal(data: Data) -> str | None:
+    """URL of the journal that an input is; None if it is none."""
+    if isinstance(data, str) and data.startswith(_JOURNALS):
+        return data
+    return f"sqlite:///{data}" if isinstance(data, str | Path) and is_sqlite(Path(data)) else None
+
+
+def _journalled(url: str, require_checksum: bool) -> list[Source]:
     """The inputs of a live service from its journal, as they were received."""
     from surefix.io.journal import journal_logs
 
     return [
         Source(logs, role, name)
-        for name, role, logs in journal_logs(place, require_checksum=require_checksum)
+        for name, role, logs in journal_logs(url, require_checksum=require_checksum)
     ]
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "Status",
     "begin",
     "blank_status",
+    "by_velocity",
     "estimate",
     "join_status",
     "unjudged",
@@ -182,6 +183,24 @@ def verdicts(
         reason.astype(np.int64),
         detail,
         np.where((reason == Reason.RUN)[:, None], found.offset, np.nan),
+    )
+
+
+def by_velocity(
+    judged: Verdicts, found: Estimate, motion: Motion, supporting: BoolArray, *, several: bool
+) -> Verdicts:
+    """Judge ``supporting`` rows (n,) that brought nothing but a velocity by that; others stay."""
+    d = motion.axes
+    weight = found.weight[:, int(motion.group[:d].max()) + 1 :]
+    alone = supporting & np.isnan(judged.standardised).all(axis=1)
+    alone &= np.isfinite(weight).any(axis=1) & (judged.verdict == Verdict.USED)
+    leading = _fold(np.fmin, weight) if weight.shape[1] else np.full(len(alone), np.nan)
+    out = leading < _DOUBTFUL if several else leading <= _NONE
+    standardised = judged.standardised.copy()
+    standardised[alone, :d] = found.standardised[alone, d : 2 * d]
+    return judged._replace(
+        verdict=np.where(alone & out, int(Verdict.REJECTED), judged.verdict),
+        standardised=standardised,
     )
 
 

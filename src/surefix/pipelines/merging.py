@@ -61,10 +61,16 @@ class Merging(NamedTuple):
         One per input.
     sensors
         Names of all sensors met so far; ``Fixes.sensor`` indexes them.
+    patience
+        s that an input may be behind the others before they wait for it no longer.
+    released
+        Time up to which rows were let go, s.
     """
 
     inflows: tuple[_Inflow, ...]
     sensors: tuple[str, ...] = ()
+    patience: float = np.inf
+    released: float = -np.inf
 
     @property
     def ended(self) -> bool:
@@ -78,13 +84,14 @@ class Merging(NamedTuple):
         return min(there, key=lambda i: self.inflows[i].last_tau)
 
 
-def begin_merging(roles: Sequence[str]) -> Merging:
+def begin_merging(roles: Sequence[str], patience: float = np.inf) -> Merging:
     """Begin to merge inputs of the given roles.
 
     ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or ``heading``, a
-    series that is only cleaned.
+    series that is only cleaned. An input that is more than ``patience`` seconds behind is waited
+    for no longer; what it brings from before the rows that were let go is late.
     """
-    return Merging(tuple(_Inflow(role) for role in roles))
+    return Merging(tuple(_Inflow(role) for role in roles), patience=patience)
 
 
 def merge(
@@ -108,15 +115,22 @@ def merge(
     fixes = _supporting(log, inflow.role) if log is not None else None
     if fixes is not None and log is not None:
         delay = options.sensor_delay_s
-        numbers = np.array([_number(sensors, name) for name in log.sensors] or [0])
-        delays = np.array([delay.get(name, 0.0) for name in log.sensors] or [0.0])
+        names = log.sensors if inflow.role != "depth" else _depth_sensors(log)
+        numbers = np.array([_number(sensors, name) for name in names] or [0])
+        delays = np.array([delay.get(name, 0.0) for name in names] or [0.0])
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
     inflow, events = _order(inflow, fixes, options.reorder_s)
     inflows = [*merging.inflows]
     inflows[source] = inflow
-    inflows, rows = _release(inflows)
-    after = Merging(tuple(inflows), tuple(sensors))
+    least = max((each.last_tau for each in inflows if not each.ended), default=np.inf)
+    least -= merging.patience
+    for i, each in enumerate(inflows):
+        if each.held is not None and not each.ended and each.last_tau < least < np.inf:
+            inflows[i], more = _order(each, None, options.reorder_s, least)
+            events = (*events, *more)
+    inflows, rows, released = _release(inflows, merging, least)
+    after = merging._replace(inflows=tuple(inflows), sensors=tuple(sensors), released=released)
     if log is None:
         return after, Chunk(rows, (), events, (), False)
     channels = log.channels if inflow.role in _WITH_CHANNELS else ()
@@ -134,22 +148,32 @@ def _supporting(log: Log, role: str) -> Fixes | None:
     """The fixes of a log; a depth series becomes observations of the height alone."""
     if role != "depth":
         return log.fixes
-    series = [c for c in log.channels if c.name == "depth_m"]
+    series = _depths(log)
     if not series:
         return None
     time = np.concatenate([c.time for c in series])
+    number = {name: k for k, name in enumerate(_depth_sensors(log))}
+    sensor = np.concatenate([np.full(len(c.time), number[c.sensor]) for c in series])
     n = len(time)
     position = np.full((n, 3), np.nan)
     position[:, 2] = -np.concatenate([c.value for c in series])
     empty = np.full((n, 3), np.nan)
     zero = np.zeros(n, np.int64)
     return Fixes(
-        time, position, empty, empty, empty, zero, zero, np.ones(n, bool), np.arange(n), False
+        time, position, empty, empty, empty, sensor, zero, np.ones(n, bool), np.arange(n), False
     )
 
 
+def _depths(log: Log) -> list[Channel]:
+    return [channel for channel in log.channels if channel.name == "depth_m"]
+
+
+def _depth_sensors(log: Log) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(channel.sensor for channel in _depths(log)))
+
+
 def _order(
-    inflow: _Inflow, new: Fixes | None, reorder_s: float
+    inflow: _Inflow, new: Fixes | None, reorder_s: float, reached: float = -np.inf
 ) -> tuple[_Inflow, tuple[Event, ...]]:
     """Repair the clock of new rows and move those that are let go to the ready ones."""
     parts = [part for part in (inflow.held, new) if part is not None]
@@ -157,7 +181,7 @@ def _order(
     inflow, place = _place(inflow, new)
     row = new.row if new is not None else np.empty(0, np.int64)
     repaired, clock, events = repair(
-        fresh, place, row, inflow.clock, final=inflow.ended, window=reorder_s
+        fresh, place, row, inflow.clock, final=inflow.ended, window=reorder_s, reached=reached
     )
     inflow = inflow._replace(clock=clock)
     if parts:
@@ -187,9 +211,15 @@ def _place(inflow: _Inflow, fixes: Fixes | None) -> tuple[_Inflow, FloatArray]:
     return inflow, np.column_stack([east, latitude]) * METRES_PER_DEGREE
 
 
-def _release(inflows: list[_Inflow]) -> tuple[list[_Inflow], Rows | None]:
-    """Merge the ready rows that no input can still precede."""
-    until = min((inflow.last_tau for inflow in inflows if not inflow.ended), default=np.inf)
+def _release(
+    inflows: list[_Inflow], merging: Merging, least: float
+) -> tuple[list[_Inflow], Rows | None, float]:
+    """Merge the ready rows that no input can still precede; also tells up to when.
+
+    An input that is behind ``least`` is not waited for.
+    """
+    waits = (max(inflow.last_tau, least) for inflow in inflows if not inflow.ended)
+    until = min(waits, default=np.inf)
     out: list[Rows] = []
     keys: list[FloatArray] = []
     after: list[_Inflow] = []
@@ -203,12 +233,16 @@ def _release(inflows: list[_Inflow]) -> tuple[list[_Inflow], Rows | None]:
         after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
         out.append(take_rows(rows, ~stay))
         keys.append(key[~stay])
+    released = max([merging.released, *(float(key[-1]) for key in keys if len(key))])
     if not sum(len(rows.tau) for rows in out):
-        return after, None
+        return after, None, released
     together = join_rows(out)
     if len(out) > 1:
         together = take_rows(together, np.argsort(np.concatenate(keys), kind="stable"))
-    return after, together
+    if merging.patience < np.inf:
+        late = together.late | (together.tau < merging.released)
+        together = together._replace(late=late)
+    return after, together, released
 
 
 def _carried(tau: FloatArray) -> FloatArray:

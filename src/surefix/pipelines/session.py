@@ -27,7 +27,11 @@ _PORTION = 50_000  # rows cleaned at a time in real time; or as many as it is se
 
 
 def begin_session(
-    inputs: Sequence[tuple[str, str]], options: CleanOptions, estimator: Estimator | None = None
+    inputs: Sequence[tuple[str, str]],
+    options: CleanOptions,
+    estimator: Estimator | None = None,
+    *,
+    live: bool = False,
 ) -> Session:
     """Begin to clean a log.
 
@@ -39,11 +43,12 @@ def begin_session(
         How to clean.
     estimator
         One that is not among the methods; None for the method of the options.
+    live
+        Whether an input may fall silent: one that is ``reorder_s`` behind is waited for no longer.
     """
     names, roles = [name for name, _ in inputs], [role for _, role in inputs]
-    return Session(
-        options=options, names=tuple(names), merging=begin_merging(roles), estimator=estimator
-    )
+    merging = begin_merging(roles, options.reorder_s if live else np.inf)
+    return Session(options=options, names=tuple(names), merging=merging, estimator=estimator)
 
 
 def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tuple[Cleaned, ...]]:
@@ -84,7 +89,7 @@ def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tu
     return _batches(replace(session, waiting=()), waiting, final=merging.ended)
 
 
-def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
+def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Session, tuple[Cleaned, ...]]:
     """Tell what is known of the newest rows, which still wait for late ones to be put before them.
 
     It is what `advance` would give if all inputs ended here, but for series that are not settled.
@@ -95,6 +100,11 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
         In real time and settled; it goes on from where it is.
     logs
         What is left of each input.
+
+    Returns
+    -------
+    session, batches
+        How it would stand then, and what would be done.
     """
     waiting = [*session.waiting]
     merging = session.merging
@@ -104,7 +114,7 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Cleaned, ...]:
                 merging, chunk = merge(merging, source, part, session.options)
                 waiting.append(chunk)
     session = replace(session, merging=merging, waiting=(), arrived={})
-    return _batches(session, waiting, final=True, begins=False)[1]
+    return _batches(session, waiting, final=True, begins=False)
 
 
 def _nothing_found(session: Session) -> InputError:

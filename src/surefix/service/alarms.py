@@ -7,10 +7,28 @@ been acknowledged. A cause that comes back makes a new alarm.
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Literal, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, Literal, NamedTuple
 
-__all__ = ["Alarm", "Priority", "acknowledged", "active", "cleared", "raised"]
+__all__ = [
+    "Alarm",
+    "Cause",
+    "Priority",
+    "acknowledged",
+    "active",
+    "as_text",
+    "changed",
+    "cleared",
+    "forgotten",
+    "from_texts",
+    "raised",
+    "up_to_date",
+]
+
+_KEPT: Final = 3600.0  # s that a closed alarm is remembered by the service …
+_MOST: Final = 200  # … and so many at most: the journal keeps them all
 
 Priority = Literal["alarm", "warning", "caution"]
 """What is lost already, what will be lost soon, and what one should know."""
@@ -53,6 +71,22 @@ class Alarm(NamedTuple):
 Alarms = tuple[Alarm, ...]
 
 
+class Cause(NamedTuple):
+    """Something that is wrong at present.
+
+    Parameters
+    ----------
+    priority
+        How urgent it is.
+    text
+        What is wrong: one word, a colon, and the rest. The same word is the same cause, and the
+        alarm keeps its first text.
+    """
+
+    priority: Priority
+    text: str
+
+
 def raised(alarms: Alarms, concerns: str, priority: Priority, text: str, now: float) -> Alarms:
     """Raise an alarm; one about the same whose cause lasts only takes the new words and urgency."""
     for k, each in enumerate(alarms):
@@ -86,3 +120,77 @@ def active(alarms: Alarms) -> Alarms:
     order = {"alarm": 0, "warning": 1, "caution": 2}
     shown = [each for each in alarms if each.open]
     return tuple(sorted(shown, key=lambda each: (order[each.priority], -each.since)))
+
+
+def up_to_date(alarms: Alarms, causes: Mapping[str, Cause], now: float) -> Alarms:
+    """Raise what is wrong, clear what no longer is, and forget what is long over.
+
+    Parameters
+    ----------
+    alarms
+        As they were.
+    causes
+        All that is wrong at present, by what it concerns.
+    now
+        s, Unix.
+    """
+    lasting = {each.concerns: each for each in alarms if math.isnan(each.gone)}
+    for concerns in lasting.keys() - causes.keys():
+        alarms = cleared(alarms, concerns, now)
+    for concerns, cause in causes.items():
+        known = lasting.get(concerns)
+        same = known is not None and _word(known.text) == _word(cause.text)
+        if known is None or not same or known.priority != cause.priority:
+            alarms = raised(alarms, concerns, cause.priority, cause.text, now)
+    return forgotten(alarms, now)
+
+
+def forgotten(alarms: Alarms, now: float) -> Alarms:
+    """Forget those that were closed an hour ago, and the oldest that are over if there are many.
+
+    The last one stays, for its number.
+    """
+    kept = [
+        each
+        for each in alarms
+        if each is alarms[-1] or each.open or now - max(each.gone, each.seen) < _KEPT
+    ]
+    over = [each for each in kept[:-1] if not math.isnan(each.gone)]
+    surplus = {each.number for each in over[: max(len(kept) - _MOST, 0)]}
+    return tuple(each for each in kept if each.number not in surplus)
+
+
+def changed(before: Alarms, after: Alarms) -> Alarms:
+    """Those of ``after`` that are new or not what they were."""
+    old = {each.number: as_text(each) for each in before}
+    return tuple(each for each in after if old.get(each.number) != as_text(each))
+
+
+def as_text(alarm: Alarm) -> str:
+    """An alarm as JSON, for the journal; unknown times are null."""
+    plain = {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in alarm._asdict().items()
+    }
+    return json.dumps(plain, ensure_ascii=False)
+
+
+def from_texts(texts: Iterable[str], now: float) -> Alarms:
+    """The alarms from what the journal says of them: the last text about each counts.
+
+    A text that is none of an alarm is passed over.
+    """
+    found: dict[int, Alarm] = {}
+    for text in texts:
+        try:
+            plain = json.loads(text)
+            known: dict[str, Any] = {k: math.nan if v is None else v for k, v in plain.items()}
+            alarm = Alarm(**known)
+        except (TypeError, ValueError, AttributeError):
+            continue
+        found[alarm.number] = alarm
+    return forgotten(tuple(found[number] for number in sorted(found)), now)
+
+
+def _word(text: str) -> str:
+    return text.partition(":")[0]

@@ -42,7 +42,8 @@ class Line:
     trouble
         Why not, in words.
     size, last
-        Bytes so far, and s, Unix, when the last came; NaN before.
+        Bytes so far, of a log those of earlier runs, too, and s, Unix, when the last came; NaN
+        before.
     refused
         Datagrams of senders that are not listed, and the last such sender.
     ended
@@ -226,7 +227,7 @@ async def _serial(address: Address) -> AsyncIterator[bytes]:
 
 
 async def _replay(source: int, line: Line, inbox: Inbox) -> None:
-    """Send a recorded log line by line, as fast as it says times the speed; 0: as can be."""
+    """Send what is left of a log line by line, as fast as it says times the speed; 0: as can be."""
     speed = line.address.figure
     began, first, due = time.monotonic(), math.nan, 0.0
     latest = math.nan
@@ -243,6 +244,7 @@ async def _replay(source: int, line: Line, inbox: Inbox) -> None:
 
     try:
         with Path(line.address.path).open("rb") as file:
+            file.seek(line.size)
             while text := file.readline(_BLOCK):
                 now = _recorded(text, latest) if speed > 0.0 else math.nan
                 if not math.isnan(now):

@@ -13,33 +13,39 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Final
 
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import Epoch, sentences
-from surefix.service.alarms import Alarms, acknowledged, cleared, raised
+from surefix.service import alarms as alarm
+from surefix.service.alarms import Alarm
+from surefix.service.causes import Condition, causes
 from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
+from surefix.service.judgement import judge_sensors
+from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
 from surefix.service.sensors import SensorState
 from surefix.service.station import (
+    Ahead,
     Latest,
     Station,
     begin_station,
-    latest,
+    look_ahead,
     receive,
     resumed,
     stored,
 )
+from surefix.service.steady import SteadyClock
 from surefix.types import Cleaned
 
 __all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
-_KEPT: Final = 64 << 20  # bytes that are kept for a journal that cannot be written
 
 
 @dataclass
@@ -50,8 +56,8 @@ class Live:
     ----------
     options
         What it does.
-    journal
-        Where it is written.
+    journal, keeper
+        Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
     lines, outputs
@@ -59,11 +65,13 @@ class Live:
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
     unwritten
-        Received and told things that the journal has not got yet.
-    lost
-        Bytes that it will never get: they are a gap of the mission.
+        What was received and told since the journal was last written.
+    sensors
+        How each is judged.
     alarms
-        What is wrong at present, by what it concerns.
+        Those that are open, and those that were closed not long ago.
+    set_by
+        s by which the computer's clock was set since the service began.
     history
         The last rows that were cleaned for good; as many as the web side keeps.
     watchers
@@ -72,6 +80,7 @@ class Live:
 
     options: LiveOptions
     journal: Journal
+    keeper: Keeper
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
@@ -79,11 +88,14 @@ class Live:
     taken: int = 0
     said: int = 0
     unwritten: list[Received | Told] = field(default_factory=list)
-    lost: int = 0
-    alarms: Alarms = ()
     sensors: tuple[SensorState, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
+    set_by: float = 0.0
+    ahead: Ahead | None = None
+    fixed_at: tuple[float, float] = (math.nan, math.nan)  # validity of the last row, and when seen
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    shed_at: float = -math.inf
     history: History = field(default_factory=lambda: History(0))
     watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
 
@@ -109,30 +121,53 @@ def begin_live(options: LiveOptions) -> Live:
         station, _ = receive(station, [piece])
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
-    live = Live(options, journal, station, lines, taken=taken, said=said)
-    if options.web is not None:
-        live.history = History(options.web.history_rows)
-        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
-        live.history.sensors = station.session.sensors
-    return live
+    for source, size in _replayed(options, journal).items():
+        lines[source].size = size
+    known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
+    keeper, history = Keeper(journal), _remembered(options, journal, station)
+    return Live(
+        options, journal, keeper, station, lines,
+        taken=taken, said=said, alarms=known, history=history,
+    )  # fmt: skip
+
+
+def _remembered(options: LiveOptions, journal: Journal, station: Station) -> History:
+    """The last rows that the journal has; none if they cannot be read: they are only looked at."""
+    most = 0 if options.web is None else options.web.history_rows
+    history = History(most)
+    if most:
+        history.sensors = station.session.sensors
+        with contextlib.suppress(InputError):
+            history.extend(unpacked(journal.newest("rows", most)))
+    return history
+
+
+def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
+    """How much of the recorded logs is in the journal already, bytes: they go on from there."""
+    logs = {i for i, each in enumerate(options.inputs) if each.address.kind == "file"}
+    return {i: size for i, size in journal.sizes().items() if i in logs} if logs else {}
 
 
 async def run_live(
-    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] = time.time
+    live: Live, stop: asyncio.Event, *, clock: Callable[[], float] | None = None
 ) -> None:
     """Serve until ``stop`` is set, or all inputs are recorded logs that have ended.
+
+    Without a ``clock`` it is one that does not step when the computer's clock is set.
 
     Raises
     ------
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox, web = Inbox(), None
+    inbox, steady = Inbox(), SteadyClock()
+    clock, web = clock or steady, None
     try:
         if live.options.web is not None:
             from surefix.service.web_server import open_web
 
             web = open_web(live, live.options.web, clock)
+            live.watchers.append(web.notice)
         for wanted in live.options.outputs:
             live.outputs.append((wanted, await open_output(wanted.address)))
         async with asyncio.TaskGroup() as tasks:
@@ -141,11 +176,11 @@ async def run_live(
                 for i, each in enumerate(live.options.inputs)
             ]
             if web is not None:
-                live.watchers.append(web.notice)
                 tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
-                _noticed(live, inbox)
+                _noticed(live, inbox, clock())
+                live.set_by = steady.set_by if clock is steady else 0.0
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
@@ -154,7 +189,7 @@ async def run_live(
     except* (InputError, OutputError) as group:
         raise group.exceptions[0] from None
     finally:
-        await _write(live, whole=True)
+        await _write(live, clock(), whole=True)
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
@@ -180,7 +215,11 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
             told.append(_told(live, known.time, "nmea", text.decode("ascii")))
             fresh.append((output, text))
     live.unwritten += [*received, *told]
-    await _write(live)
+    _judge(live, now)
+    trouble = live.keeper.trouble
+    await _write(live, now)
+    if live.keeper.trouble != trouble:
+        _heed(live, now)
     for output, text in fresh:
         output.send(text)
     for watch in live.watchers:
@@ -188,21 +227,66 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
 
 
 def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
-    """Tell that a person has seen an alarm; False if there is none of that number to be seen."""
+    """Tell that a person has seen an alarm; False if there is none of that number to be seen.
+
+    The journal has it with the next step, a second later at most.
+
+    Parameters
+    ----------
+    live
+        The service.
+    number
+        Of the alarm.
+    by
+        Who has seen it.
+    now
+        s, Unix.
+    """
     before = live.alarms
-    live.alarms = acknowledged(before, number, by, now)
-    if live.alarms != before:
-        live.unwritten.append(_told(live, now, "alarm", f"{by} has seen {number}"))
+    _set_alarms(live, alarm.acknowledged(before, number, by, now), now)
     return live.alarms != before
 
 
+def _judge(live: Live, now: float) -> None:
+    """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
+    session = live.station.session if live.ahead is None else live.ahead.session
+    inputs = [(each.name, each.role) for each in live.options.inputs]
+    at = math.nan if _recorded(live) else now
+    live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
+    _heed(live, now)
+
+
+def _heed(live: Live, now: float) -> None:
+    """Raise alarms for what is wrong, and clear those whose cause is gone."""
+    condition = Condition(now, live.now, live.keeper.trouble, live.shed_at, live.set_by)
+    found = causes(live.sensors, condition, live.options.alarms)
+    _set_alarms(live, alarm.up_to_date(live.alarms, found, now), now)
+
+
+def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
+    """Take over alarms, and tell the journal of those that are not what they were."""
+    for each in alarm.changed(live.alarms, after):
+        live.unwritten.append(_told(live, now, "alarm", alarm.as_text(each)))
+    live.alarms = after
+
+
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
-    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick."""
-    known = latest(live.station) if fresh else None
+    """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick.
+
+    Dead reckoning goes on from the last row by the time that has passed since it was seen, so that
+    a clock of this computer that is wrong does no harm.
+    """
+    known = None
+    if fresh:
+        live.ahead = look_ahead(live.station)
+        known = live.ahead.shown
+    if known is not None and not known.time <= live.fixed_at[0]:
+        live.fixed_at = known.time, now
     behind = live.now is not None and (known is None or known.time <= live.now.time)
     if not behind or now - live.shown_at < _TICK or _recorded(live):
         return known
-    return latest(live.station, now)
+    newest, seen = live.fixed_at
+    return look_ahead(live.station, newest + now - seen).shown
 
 
 def _recorded(live: Live) -> bool:
@@ -255,50 +339,37 @@ async def _next(inbox: Inbox, stop: asyncio.Event) -> list[Arrived]:
     return taking.result() if taking in done else []
 
 
-def _noticed(live: Live, inbox: Inbox) -> None:
+def _noticed(live: Live, inbox: Inbox, now: float) -> None:
     """Say that more came than could be taken."""
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
-        live.alarms = raised(live.alarms, "load", "warning", text, time.time())
-        inbox.shed = 0
+        live.unwritten.append(_told(live, now, "event", f"overload: {text}"))
+        live.shed_at, inbox.shed = now, 0
 
 
-async def _write(live: Live, *, whole: bool = False) -> None:
+async def _write(live: Live, now: float, *, whole: bool = False) -> None:
     """Write what is not written yet, and a snapshot if it is time; without success, keep it."""
-    snapshot = None
     due = time.monotonic() - live.stored_at >= live.options.snapshot_s
-    if live.station.session.setup is not None and (whole or due):
-        snapshot = live.station.after, stored(live.station)
-    written = len(live.unwritten)
-    received = [each for each in live.unwritten if isinstance(each, Received)]
-    told = [each for each in live.unwritten if isinstance(each, Told)]
-    if not received and not told and not whole:
-        return
-    try:
-        await asyncio.to_thread(live.journal.write, received, told, snapshot)
-    except OutputError as error:
-        live.alarms = raised(live.alarms, "journal", "alarm", str(error), time.time())
-        _spare(live)
-        return
-    if snapshot is not None:
-        live.stored_at = time.monotonic()
-    del live.unwritten[:written]
-    live.alarms = cleared(live.alarms, "journal", time.time())
-    if live.lost:
-        text = f"the journal was away: {live.lost} bytes of the mission are not in it"
-        live.unwritten.append(_told(live, math.nan, "alarm", text))
-        live.lost = 0
+    keeper, records = live.keeper, live.unwritten
+    live.unwritten = []
+    snapshot = None
+    if live.station.session.setup is not None and (whole or (due and records)):
+
+        def snapshot() -> tuple[int, bytes]:
+            live.stored_at = time.monotonic()
+            return live.station.after, stored(live.station)
+
+    if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:
+        gap, keeper.gap = keeper.gap, Gap()
+        known = alarm.raised(live.alarms, "mission", "warning", _missing(gap), now)
+        _set_alarms(live, alarm.cleared(known, "mission", now), now)
+        if whole:
+            await keeper.keep(live.unwritten, last=True)
 
 
-def _spare(live: Live) -> None:
-    """Keep no more than there is room for: the oldest goes, and is counted."""
-    size = sum(_size(each) for each in live.unwritten)
-    while size > _KEPT:
-        gone = live.unwritten.pop(0)
-        size -= _size(gone)
-        live.lost += _size(gone)
-
-
-def _size(each: Received | Told) -> int:
-    return len(each.data) if isinstance(each, Received) else len(each.text)
+def _missing(gap: Gap) -> str:
+    text = f"gap: the journal was away, {gap.size} bytes of the mission are not in it"
+    if math.isnan(gap.first):
+        return text
+    first, last = (f"{datetime.fromtimestamp(at, UTC):%Y-%m-%dT%H:%M:%SZ}" for at in gap[2:])
+    return f"{text}, of {first} to {last}"

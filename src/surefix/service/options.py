@@ -21,6 +21,10 @@
 
     [web]                             # see surefix.service.web_options
     address = "127.0.0.1:8000"
+
+    [alarms]
+    position_sigma_m = 10.0           # σ above which the position is called uncertain
+    dead_reckoning_s = 10.0           # time without a fix after which it is called lost
 """
 
 from __future__ import annotations
@@ -39,7 +43,7 @@ from surefix.pipelines.options import CleanOptions, options_from
 from surefix.service.addresses import INPUTS, OUTPUTS, Address, address
 from surefix.service.web_options import WebOptions, read_web
 
-__all__ = ["SENTENCES", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
+__all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOptions", "read_live"]
 
 SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
@@ -77,7 +81,7 @@ class InputOptions:
             raise OptionsError(f"input name {self.name!r}", "a name")
         if self.role not in _ROLES:
             raise OptionsError(f"role {self.role!r} of {self.name}", "one of " + ", ".join(_ROLES))
-        for network in self.allow:
+        for network in _texts("allow", self.allow):
             try:
                 ipaddress.ip_network(network, strict=False)
             except ValueError as error:
@@ -105,11 +109,35 @@ class OutputOptions:
     talker: str = "GP"
 
     def __post_init__(self) -> None:
-        for name in self.sentences:
+        for name in _texts("sentences", self.sentences):
             if name not in SENTENCES:
                 raise OptionsError(f"sentence {name!r}", "one of " + ", ".join(SENTENCES))
         if not isinstance(self.talker, str) or not _TALKER.fullmatch(self.talker):
             raise OptionsError(f"talker {self.talker!r}", "two capital letters")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlarmOptions:
+    """When the position is no longer to be relied on.
+
+    Parameters
+    ----------
+    position_sigma_m
+        Horizontal standard deviation above which it is uncertain, m.
+    dead_reckoning_s
+        Time without a fix that was used, s, after which it is lost. The default is the time within
+        which IMO A.1046(27) wants to be warned.
+    """
+
+    position_sigma_m: float = 10.0
+    dead_reckoning_s: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("position_sigma_m", "dead_reckoning_s"):
+            value = getattr(self, name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not value > 0.0:
+                raise OptionsError(f"{name} = {value!r}", "a number above 0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +156,8 @@ class LiveOptions:
         Time between two snapshots, s.
     web
         Dashboard and API; None: none.
+    alarms
+        When alarms are raised.
     """
 
     clean: CleanOptions
@@ -136,6 +166,7 @@ class LiveOptions:
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
     web: WebOptions | None = None
+    alarms: AlarmOptions = AlarmOptions()
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -169,6 +200,7 @@ def read_live(path: str | Path) -> LiveOptions:
     if given.setdefault("mode", "realtime") != "realtime":
         raise OptionsError(f"{place}: mode {given['mode']!r}", "realtime")
     journal = _table(place, content, "journal", {"url", "snapshot_s"})
+    alarms = _table(place, content, "alarms", {"position_sigma_m", "dead_reckoning_s"})
     if (url := journal.get("url")) is not None:
         journal["url"] = _beside(place, str(url))
     return LiveOptions(
@@ -176,8 +208,15 @@ def read_live(path: str | Path) -> LiveOptions:
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
         web=_web(place, content),
+        alarms=AlarmOptions(**alarms),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
+
+
+def _texts(name: str, values: object) -> tuple[str, ...]:
+    if isinstance(values, tuple) and all(isinstance(each, str) for each in values):
+        return values
+    raise OptionsError(f"{name} = {values!r}", 'a list of texts, as ["…"]')
 
 
 def _beside(place: Path, url: str) -> str:

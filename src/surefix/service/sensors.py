@@ -20,7 +20,8 @@ class SensorState(NamedTuple):
     quantity
         ``position``, ``velocity``, ``depth`` or ``heading``.
     validity, reason
-        The judgement, and why: stale, frozen, jumping, biased, noisy; empty when valid.
+        The judgement, and why; empty when valid. The reason begins with one word: ``silent``,
+        ``stale``, ``frozen``, ``jumping``, ``biased`` or ``noisy``.
     since
         s, Unix: since when it is judged so.
     observed
@@ -30,9 +31,10 @@ class SensorState(NamedTuple):
     latency
         s, median between validity and arrival in the last minute; NaN without times of arrival.
     rejected
-        Share of its observations of the last minute that were rejected.
+        Share of its last observations that were rejected; NaN before the first was judged. Like
+        the next it is the record that the filter keeps, `surefix.filters.health`.
     innovation
-        RMS of its normalised innovations of the last minute; 1 is as declared.
+        RMS of the normalised innovations of those used; 1 is as declared, or as was settled.
     """
 
     name: str
@@ -46,3 +48,8 @@ class SensorState(NamedTuple):
     latency: float = math.nan
     rejected: float = math.nan
     innovation: float = math.nan
+
+    @property
+    def word(self) -> str:
+        """The first word of the reason."""
+        return self.reason.partition(" ")[0].rstrip(":")

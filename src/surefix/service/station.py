@@ -21,10 +21,21 @@ from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
+from surefix.service.heard import Heard, hear
 from surefix.service.options import LiveOptions
 from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
-__all__ = ["Latest", "Station", "begin_station", "latest", "receive", "resumed", "stored"]
+__all__ = [
+    "Ahead",
+    "Latest",
+    "Station",
+    "begin_station",
+    "latest",
+    "look_ahead",
+    "receive",
+    "resumed",
+    "stored",
+]
 
 _STALE: Final = 3.0  # s since the last fix used, after which a position says it is dead-reckoned
 
@@ -58,6 +69,21 @@ class Latest(NamedTuple):
         return not self.time - self.observed <= _STALE
 
 
+class Ahead(NamedTuple):
+    """What all that was received says, were nothing to come any more.
+
+    Parameters
+    ----------
+    session
+        As it would stand; that of the station as long as nothing is settled.
+    shown
+        Where the vehicle is; None as long as nothing is settled.
+    """
+
+    session: Session
+    shown: Latest | None
+
+
 @dataclass(frozen=True)
 class Station:
     """What is known.
@@ -72,19 +98,22 @@ class Station:
         Number of the last bytes taken.
     shown
         Where the vehicle was at the last row that is cleaned for good; None before.
+    heard
+        When something came of each sensor.
     """
 
     session: Session
     streams: tuple[NmeaStream, ...]
     after: int = 0
     shown: Latest | None = None
+    heard: tuple[Heard, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
     """Begin with nothing received."""
     inputs = [(each.name, each.role) for each in options.inputs]
     streams = tuple(NmeaStream(Path(each.name), each.require_checksum) for each in options.inputs)
-    return Station(begin_session(inputs, options.clean), streams)
+    return Station(begin_session(inputs, options.clean, live=True), streams)
 
 
 class _Stored(NamedTuple):
@@ -94,12 +123,14 @@ class _Stored(NamedTuple):
     streams: tuple[Mapping[str, object], ...]
     after: int
     shown: Latest | None
+    heard: tuple[Heard, ...]
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    return snapshot(_Stored(station.session, states, station.after, station.shown))
+    kept = _Stored(station.session, states, station.after, station.shown, station.heard)
+    return snapshot(kept)
 
 
 def resumed(options: LiveOptions, content: bytes) -> Station:
@@ -114,7 +145,7 @@ def resumed(options: LiveOptions, content: bytes) -> Station:
     streams = begin_station(options).streams
     for stream, state in zip(streams, known.streams, strict=True):
         stream.resume(state)
-    return Station(known.session, streams, known.after, known.shown)
+    return Station(known.session, streams, known.after, known.shown, known.heard)
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
@@ -125,7 +156,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     station, batches
         What is known now, and what is cleaned for good.
     """
-    session, streams = station.session, [*station.streams]
+    session, streams, heard = station.session, [*station.streams], station.heard
     batches: list[Cleaned] = []
     fresh: set[int] = set()
     for piece in received:
@@ -136,14 +167,22 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
+        heard = hear(heard, piece.source, log, stream.begun, piece.time)
         session, done = advance(session, piece.source, log)
         batches += done
+        behind = max((each.latest for each in heard), default=-math.inf) - session.options.reorder_s
+        for i, other in enumerate(streams):
+            begun = other.begun
+            if i != piece.source and begun and begun[0][2] < behind:
+                streams[i] = copy.deepcopy(other)
+                session, done = advance(session, i, streams[i].settle(behind))
+                batches += done
         if not piece.data:
             session, done = advance(session, piece.source, None)
             batches += done
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
-    return Station(session, tuple(streams), after, shown), tuple(batches)
+    return Station(session, tuple(streams), after, shown, heard), tuple(batches)
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
@@ -157,14 +196,19 @@ def latest(station: Station, time: float = math.nan) -> Latest | None:
         s, Unix: later than all that was received, the track is carried on to it by dead reckoning.
         NaN: at the last fix.
     """
+    return look_ahead(station, time).shown
+
+
+def look_ahead(station: Station, time: float = math.nan) -> Ahead:
+    """Tell what all that was received says; arguments as for `latest`."""
     if station.session.setup is None:
-        return None
+        return Ahead(station.session, None)
     logs = [copy.deepcopy(stream).rest() for stream in station.streams]
     roles = [inflow.role for inflow in station.session.merging.inflows]
     first = roles.index("fixes")
     logs[first] = _with(logs[first], time)
-    batches = end_on_trial(station.session, logs)
-    return _last(batches, station.shown)
+    session, batches = end_on_trial(station.session, logs)
+    return Ahead(session, _last(batches, station.shown))
 
 
 def _with(log: Log, time: float) -> Log:

@@ -58,7 +58,7 @@ const outward = (exit) => {
 
 /** Show the inputs, the outputs and the journal of a record. */
 export const showLines = (record) => {
-  const journal = record.unwritten ? `${record.unwritten} things wait to be written` : "written";
+  const journal = record.unwritten ? `${size(record.unwritten)} wait to be written` : "written";
   const lines = [...record.inputs.map(inward), ...record.outputs.map(outward)];
   lines.push(["journal", journal]);
   const blank = () => {

@@ -1,0 +1,37 @@
+"""Being told to stop: Ctrl-C and SIGTERM end a command wherever they meet it."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+from typing import Final
+
+__all__ = ["TERMINATED", "obey"]
+
+TERMINATED: Final = 143
+"""What a command that was terminated ends with."""
+
+_SOON: Final = 0.01  # s
+
+
+def obey() -> None:
+    """Let SIGTERM unwind like Ctrl-C, so that unfinished files are removed, and lose neither.
+
+    Both are exceptions, and an exception that comes up while an object is finalised is dropped by
+    the interpreter: then the signal is sent again.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    sys.unraisablehook = _again
+
+
+def _again(dropped: sys.UnraisableHookArgs) -> None:
+    if issubclass(dropped.exc_type, KeyboardInterrupt):
+        number = signal.SIGINT
+    elif issubclass(dropped.exc_type, SystemExit):
+        number = signal.SIGTERM
+    else:
+        sys.__unraisablehook__(dropped)
+        return
+    threading.Timer(_SOON, _thread.interrupt_main, [number]).start()

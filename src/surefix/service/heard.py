@@ -1,0 +1,123 @@
+"""What was heard of each sensor: when, how late, and whether it stands by it itself.
+
+Only times are kept, of the last minute; what the observations are worth the session says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from surefix.types import FloatArray, Log
+
+__all__ = ["QUANTITIES", "Begun", "Heard", "hear"]
+
+QUANTITIES: Final = {"heading_deg": "heading", "depth_m": "depth", "forward_mps": "velocity"}
+"""What a series is an observation of, by its name; other series come from a sensor of positions."""
+
+Begun = tuple[str, int, float, bool]
+"""A fix that may still grow: sensor, number, time of validity, whether it has a position."""
+
+_WINDOW: Final = 60.0  # s that are remembered …
+_LEAST: Final = 6  # … but at least so many observations …
+_MOST: Final = 600  # … and at most
+
+
+class Heard(NamedTuple):
+    """What was heard of one sensor.
+
+    Parameters
+    ----------
+    name, source, quantity
+        Of the sensor, the number of its input, and what it measures.
+    time, delay
+        (n,) s, Unix: validity of its last observations, in the order of arrival, and how much later
+        they arrived, s; NaN where the time of arrival is not known.
+    arrived
+        s, Unix: when the last one arrived.
+    marked
+        s, Unix: validity of the last one that it called invalid itself; NaN if none.
+    row
+        Number of the last fix.
+    """
+
+    name: str
+    source: int
+    quantity: str
+    time: FloatArray = np.empty(0)
+    delay: FloatArray = np.empty(0)
+    arrived: float = math.nan
+    marked: float = math.nan
+    row: int = -1
+
+    @property
+    def interval(self) -> float:
+        """Usual time between two observations, s; NaN where there are too few."""
+        steps = np.diff(np.sort(self.time))
+        steps = steps[steps > 0.0]
+        return float(np.median(steps)) if len(steps) else math.nan
+
+    @property
+    def latest(self) -> float:
+        """Validity of the last observation, s; −∞ where there is none."""
+        return float(self.time[-1]) if len(self.time) else -math.inf
+
+    @property
+    def rate(self) -> float:
+        """Observations a second; NaN where there are too few."""
+        span = float(np.ptp(self.time)) if len(self.time) > 1 else 0.0
+        return (len(self.time) - 1) / span if span > 0.0 else math.nan
+
+    @property
+    def latency(self) -> float:
+        """Median of the delays, s; NaN without times of arrival."""
+        known = self.delay[np.isfinite(self.delay)]
+        return float(np.median(known)) if len(known) else math.nan
+
+
+def hear(
+    heard: tuple[Heard, ...], source: int, log: Log, begun: Sequence[Begun], arrival: float
+) -> tuple[Heard, ...]:
+    """Take note of what came with one piece of an input.
+
+    Parameters
+    ----------
+    heard
+        What was known before.
+    source, log, begun
+        Number of the input, what was read of it, and the fixes that are not complete yet.
+    arrival
+        s, Unix, of the piece; NaN if it is not known.
+    """
+    known = {(each.source, each.name): each for each in heard}
+    rows: list[Begun] = []
+    if log.fixes is not None:
+        fixes = log.fixes
+        there = fixes.valid & np.isfinite(fixes.position[:, :2]).all(axis=1)
+        columns = (fixes.sensor.tolist(), fixes.row.tolist(), fixes.time.tolist(), there.tolist())
+        rows = [(log.sensors[s], *rest) for s, *rest in zip(*columns, strict=True)]
+    for name, number, time, good in [*rows, *begun]:
+        before = known.get((source, name), Heard(name, source, "position"))
+        if number > before.row and math.isfinite(time):
+            news = _with(before, [time], arrival) if good else before._replace(marked=time)
+            known[source, name] = news._replace(row=number)
+    for channel in log.channels:
+        if (quantity := QUANTITIES.get(channel.name)) is not None:
+            before = known.get((source, channel.sensor), Heard(channel.sensor, source, quantity))
+            there = np.isfinite(channel.time) & np.isfinite(channel.value)
+            known[source, channel.sensor] = _with(before, channel.time[there].tolist(), arrival)
+    return tuple(known.values())
+
+
+def _with(heard: Heard, times: list[float], arrival: float) -> Heard:
+    """Add observations; what is older than a minute is forgotten, but for the last few."""
+    if not times:
+        return heard
+    time = np.concatenate([heard.time, times])[-_MOST:]
+    delay = np.concatenate([heard.delay, arrival - np.array(times)])[-_MOST:]
+    keep = np.abs(time - time[-1]) <= _WINDOW
+    keep[-_LEAST:] = True
+    return heard._replace(time=time[keep], delay=delay[keep], arrived=arrival)
