@@ -179,7 +179,7 @@ class Journal:
     def newest(self, kind: str, most: int) -> list[str]:
         """Give the last texts of a kind that were told, at most so many, in their order."""
         query = select(_TOLD.c.text).where(_TOLD.c.kind == kind)
-        with self._reading() as connection:
+        with self._place.reading() as connection:
             rows = connection.execute(query.order_by(_TOLD.c.number.desc()).limit(most))
             return [str(text) for text in rows.scalars()][::-1]
 
