@@ -6,6 +6,7 @@ With ``SUREFIX_REQUIRE_TOOLS=1``, as in CI, a missing program is a failure inste
 import importlib
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,12 @@ def package(name):
         return importlib.import_module(name)
     except ImportError:
         return _absent(f"the package {name} is not installed")
+
+
+def built(*parts):
+    """Path of what `.ci/run` has installed in the build folder."""
+    place = Path(__file__).parents[1].joinpath("build", *parts)
+    return place if place.exists() else _absent(f"{place.name} is not installed: .ci/run")
 
 
 def _absent(text):

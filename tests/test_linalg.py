@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from surefix.linalg import absorb, cholesky, multiply_transpose, solve_lower, triangularize
+from surefix.linalg import (
+    absorb,
+    cholesky,
+    multiply,
+    multiply_transpose,
+    solve_lower,
+    triangularize,
+)
 
 SIZES = [1, 2, 3, 6, 9]
 
@@ -114,3 +121,11 @@ def test_multiply_transpose(rows, columns):
     np.testing.assert_allclose(P[:rows, :rows], part @ part.T, rtol=1e-13, atol=1e-15)
     assert (P[rows:] == 0.0).all()
     assert (P == P.T).all()
+
+
+@pytest.mark.parametrize(("m", "k", "n"), [(1, 1, 1), (2, 6, 3), (6, 6, 6), (3, 0, 2)])
+def test_a_product_of_matrices(m, k, n):
+    rng = np.random.default_rng(m + n)
+    A, B, C = rng.normal(size=(m, k)), rng.normal(size=(k, n)), np.full((m, n), np.nan)
+    multiply(A, B, C)
+    np.testing.assert_allclose(C, A @ B, atol=1e-14)

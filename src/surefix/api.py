@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from surefix.io.edits import read_edits
 from surefix.pipelines.clean import clean_sources
+from surefix.pipelines.editing import edit_sources
 from surefix.pipelines.inputs import Data, open_inputs
 from surefix.pipelines.locate import Located, LocateMode, locate_sights
 from surefix.pipelines.options import CleanOptions
@@ -27,6 +29,7 @@ def clean(
     heading: Data | None = None,
     columns: Mapping[str, str] | None = None,
     target: str | None = None,
+    edits: str | Path | None = None,
     options: CleanOptions | None = None,
 ) -> Cleaned:
     """Clean a log and give the track, and for every fix a verdict with its reason.
@@ -45,6 +48,8 @@ def clean(
     target
         Whose fixes to take from the log of an acoustic positioning system: a transponder, or
         ``ship``; default the transponder that is seen most often.
+    edits
+        An edit log of ``surefix edit`` or ``surefix review``.
     options
         Mode, method and figures; see `CleanOptions`.
 
@@ -68,6 +73,8 @@ def clean(
         columns=columns,
         target=target,
     )
+    if edits is not None:
+        sources = edit_sources(sources, read_edits(edits))
     return clean_sources(sources, options or CleanOptions())
 
 

@@ -13,7 +13,9 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.exceptions import TyperException
 
+from surefix.cli_begin import begin
 from surefix.cli_compare import compare
+from surefix.cli_edit import edit
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_fleet import fleet
 from surefix.cli_inputs import (
@@ -29,6 +31,7 @@ from surefix.cli_inputs import (
 from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
+from surefix.cli_review import review
 from surefix.cli_signals import obey
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
@@ -159,6 +162,9 @@ def clean(
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
     ] = None,
+    edits: Annotated[
+        Path | None, typer.Option(help="Edits of single fixes, from surefix edit or review.")
+    ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
     iso: Annotated[bool, typer.Option("--iso", help="Write times as ISO 8601 in UTC.")] = False,
     no_checksum: NoChecksum = False,
@@ -167,8 +173,10 @@ def clean(
 ) -> None:
     """Clean a log: one row per fix, each with its verdict, beside the clean track."""
     from surefix.io.columns import mapping
+    from surefix.io.edits import read_edits
     from surefix.pipelines.clean import clean_batches
     from surefix.pipelines.deliver import deliver
+    from surefix.pipelines.editing import edit_sources
     from surefix.pipelines.inputs import open_inputs
     from surefix.pipelines.summary import lines, summary
 
@@ -192,7 +200,7 @@ def clean(
         _delays(sensor_delay or []),
     )
     check_report(report)
-    given = (*inputs, depth, velocity, heading, options)
+    given = (*inputs, depth, velocity, heading, options, edits)
     files = [Path(path) for path in given if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
@@ -206,6 +214,8 @@ def clean(
             target=target,
             progress=told,
         )
+        if edits is not None:
+            sources = edit_sources(sources, read_edits(edits))
         done = deliver(clean_batches(sources, chosen), output or [], iso=iso)
     written = list(done.written)
     if report is not None:
@@ -296,6 +306,8 @@ app.command()(compare)
 app.command()(locate)
 app.command()(fleet)
 app.command()(live)
+app.command()(edit)
+app.command()(review)
 app.command()(warmup)
 
 
@@ -304,6 +316,8 @@ def main() -> None:
     _use_utf8()
     obey()
     try:
+        if not {"--help", "--version"} & {*sys.argv}:
+            begin()
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:
             _fail("interrupted", _INTERRUPTED)

@@ -23,6 +23,7 @@ def live(
     import asyncio
     import signal
 
+    from surefix.service.delays import delays_told
     from surefix.service.live import begin_live, run_live
     from surefix.service.options import read_live
 
@@ -46,6 +47,11 @@ def live(
     asyncio.run(serve())
     known = service.now
     told = "no position yet" if known is None else f"the last position has σ {_sigma(known):.2f} m"
+    for delay in delays_told(service.station.delays):
+        typer.echo(
+            f"{delay.sensor}: heard {delay.median:.2f} s after it was valid, "
+            f"95 of 100 within {delay.high:.2f} s"
+        )
     typer.echo(f"stopped after {service.taken:,} pieces received; {told}")
 
 

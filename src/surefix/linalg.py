@@ -16,6 +16,7 @@ from surefix.types import FloatArray
 __all__ = [
     "absorb",
     "cholesky",
+    "multiply",
     "multiply_transpose",
     "solve_lower",
     "triangularize",
@@ -134,6 +135,17 @@ def absorb(
     for i in range(n):
         for j in range(n):
             S[i, j] -= shrink * gain[i] * phi[j]
+
+
+@helper
+def multiply(A: FloatArray, B: FloatArray, C: FloatArray) -> None:
+    """Write ``C = A B``; of small matrices that is sooner done than a BLAS is called."""
+    for i in range(A.shape[0]):
+        for j in range(B.shape[1]):
+            total = 0.0
+            for k in range(B.shape[0]):
+                total += A[i, k] * B[k, j]
+            C[i, j] = total
 
 
 @helper

@@ -182,6 +182,8 @@ class Log:
     events: tuple[Event, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     """Records met by kind (sentence type, row); for `surefix info`."""
+    delays: tuple[Channel, ...] = ()
+    """Of a stream, by sensor: how long after its validity each observation was received, s."""
     depth_positive_down: bool = False
     """True where the third axis was given as a depth (height = −depth)."""
 

@@ -1,19 +1,24 @@
 """Recorded streams, cut into pieces as they come: live says what `clean --mode realtime` says."""
 
+import asyncio
 import math
+import time
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from surefix.api import to_table
 from surefix.io.journal import Received
+from surefix.io.writers import write_cleaned
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.joining import join
 from surefix.pipelines.options import CleanOptions
 from surefix.service.addresses import Address
-from surefix.service.options import InputOptions, LiveOptions
+from surefix.service.live import begin_live, run_live
+from surefix.service.options import InputOptions, LiveOptions, read_live
 from surefix.service.station import begin_station, receive
 
 CLEAN = CleanOptions(mode="realtime", settle_rows=120, reorder_s=2.0)
@@ -52,3 +57,38 @@ def test_a_recorded_stream_is_cleaned_live_as_from_its_file(data, folder, names)
     for key, one in series[0].items():
         np.testing.assert_array_equal(one.value, series[1][key].value)
         np.testing.assert_array_equal(one.verdicts.verdict, series[1][key].verdicts.verdict)
+
+
+def replayed(folder, paths, speed):
+    """Seconds that a replay of logs took, with the track that it recorded."""
+    inputs = "".join(
+        f"[[input]]\nname = '{path.stem}'\nfrom = 'file:{path}?speed={speed}'\n" for path in paths
+    )
+    (folder / "live.toml").write_text(
+        f"[clean]\nsettle_rows = 120\nreorder_s = 2.0\n{inputs}"
+        "[[output]]\nto = 'file:track.parquet'\n"
+        "[[output]]\nto = 'tcp-listen://127.0.0.1:0'\n"
+        "[journal]\nurl = 'sqlite:///mission.db'\n"
+    )
+    began = time.monotonic()
+    asyncio.run(run_live(begin_live(read_live(folder / "live.toml")), asyncio.Event()))
+    return time.monotonic() - began, pq.read_table(folder / "track.parquet")
+
+
+@pytest.mark.parametrize(
+    ("folder", "names", "size"), [("ship_yachts", YACHTS[:1], 240_000), ("ship_palmer", PALMER, -1)]
+)
+def test_a_log_replayed_at_a_hundred_times_its_pace_is_cleaned_as_its_file(
+    data, tmp_path, folder, names, size
+):
+    """The whole path: paced bytes, inbox, journal, output, recorded file."""
+    paths = []
+    for name in names:
+        paths.append(tmp_path / name)
+        paths[-1].write_bytes((data / folder / name).read_bytes()[:size])
+    whole = clean_sources(open_inputs(paths), CLEAN)
+    write_cleaned(tmp_path / "whole.parquet", whole)
+    took, rows = replayed(tmp_path, paths, 100)
+    assert rows.equals(pq.read_table(tmp_path / "whole.parquet"))
+    lasted = float(whole.track.time[-1] - whole.track.time[0])
+    assert took > 0.9 * lasted / 100.0  # at its pace, and not as fast as can be

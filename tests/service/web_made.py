@@ -64,7 +64,7 @@ class Served:
         for client in self._clients:
             client.close()
         self.call(self._stop())
-        self._thread.join(30.0)
+        self._thread.join(120.0)
         assert not self._thread.is_alive()
         self.loop.close()
 
@@ -73,7 +73,7 @@ class Served:
 
     def call(self, coroutine):
         """Run something where the service lives."""
-        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(60.0)
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(300.0)  # kernels may be compiled first
 
     async def set(self, **values):
         """Change the service from within."""

@@ -10,7 +10,7 @@ import numpy as np
 from surefix.comparison.oracle import Oracle
 from surefix.pipelines.options import Mode
 from surefix.simulate.contamination import Trial
-from surefix.types import BoolArray, Cleaned, FloatArray, Reason, Verdict
+from surefix.types import BoolArray, Cleaned, FloatArray, Reason, Verdict, Verdicts
 
 __all__ = ["GROSS_SIGMA", "ORACLE", "Merit", "Outcome", "Outcomes", "judge", "judge_oracle"]
 
@@ -78,7 +78,7 @@ def judge(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Outcome:
     trial
         What was cleaned.
     cleaned
-        One row for each of the trial's.
+        One row for each of the trial's, and those of a source beside its fixes.
     best
         The oracle in the same mode.
     mode
@@ -86,18 +86,20 @@ def judge(trial: Trial, cleaned: Cleaned, best: Oracle, mode: Mode) -> Outcome:
     """
     d = trial.world.axes
     rows = _judged(trial, mode)
-    error = cleaned.track.position[:, :d] - trial.position
+    own = cleaned.sensor == cleaned.sensors.index("fix")
+    position, sigma = cleaned.track.position[own, :d], cleaned.track.sigma_position[own, :d]
+    error = position - trial.position
     least = best.position - trial.position
     squares = error[rows] ** 2
-    gross, good = _rejected(trial, cleaned, rows)
+    gross, good = _rejected(trial, Verdicts(*(each[own] for each in cleaned.verdicts)), rows)
     noise = _noise_ratios(trial, cleaned)
     merit = Merit(
         float(np.sqrt(squares.mean() / (least[rows] ** 2).mean())),
-        float((squares / cleaned.track.sigma_position[rows, :d] ** 2).mean()),
+        float((squares / sigma[rows] ** 2).mean()),
         gross,
         good,
         *noise,
-        _back(trial, cleaned.track.position[:, :d], best) if mode == "realtime" else np.nan,
+        _back(trial, position, best) if mode == "realtime" else np.nan,
     )
     return Outcome(merit, np.sqrt((error**2).sum(axis=1)))
 
@@ -121,9 +123,8 @@ def _judged(trial: Trial, mode: Mode) -> BoolArray:
     return rows
 
 
-def _rejected(trial: Trial, cleaned: Cleaned, rows: BoolArray) -> tuple[float, float]:
+def _rejected(trial: Trial, judged: Verdicts, rows: BoolArray) -> tuple[float, float]:
     """Percentages of gross errors and of good fixes that were rejected."""
-    judged = cleaned.verdicts
     some = judged.reason == Reason.AXIS_OFF  # detail says which, the others were used
     rejected = (judged.verdict == Verdict.REJECTED) | (judged.weight <= _REJECTED)
     axes = np.where(some, np.nan_to_num(judged.detail), 7.0).astype(np.int64)

@@ -141,6 +141,7 @@ def _estimate(motion: Motion, epochs: Epochs, found: list[Found]) -> Estimate:
         np.full((n, motion.groups), np.nan),
         np.zeros(n, np.int64),
         np.full((n, motion.axes), np.nan),
+        np.zeros(n, np.bool_),
         np.ones(n),
     )
     scale = [1.0, *(block_scale(axes, _TAIL) for axes in (1, 2, 3))]

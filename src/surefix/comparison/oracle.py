@@ -103,17 +103,24 @@ def _motion(trial: Trial, order: int, factor: FloatArray) -> Motion:
 
 
 def _epochs(trial: Trial) -> Epochs:
-    """Observations with their true variances; bad ones left out, all others used."""
+    """Observations with their true variances; bad ones left out, all others used.
+
+    Of two positions that are good the mean is taken.
+    """
     n, d = trial.fixes.shape
+    positions = np.stack([np.where(trial.bad_fix, np.nan, trial.fixes), trial.beside])
+    known = np.isfinite(positions).sum(axis=0)
+    fixes = np.where(known > 0, np.nansum(positions, axis=0) / np.maximum(known, 1), trial.fixes)
     variance = np.empty((n, 2 * d))
-    variance[:, :d], variance[:, d:] = trial.world.sigma_m**2, trial.world.sigma_mps**2
-    bad = np.hstack([trial.bad_fix, trial.bad_velocity])
+    variance[:, :d] = trial.world.sigma_m**2 / np.maximum(known, 1)
+    variance[:, d:] = trial.world.sigma_mps**2
+    bad = np.hstack([known == 0, trial.bad_velocity])
     jump = np.zeros(n, np.int64)
     if trial.jump >= 0:
         jump[trial.jump] = (1 << d) - 1
     return Epochs(
         trial.time,
-        np.hstack([trial.fixes, trial.velocities]),
+        np.hstack([fixes, trial.velocities]),
         variance,
         np.where(bad, 0.0, 1.0),
         jump,

@@ -17,7 +17,7 @@ from surefix.experiment import Experiment, Progress
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.options import CleanOptions, Mode
-from surefix.simulate.contamination import Trial, World, alone, columns, draw
+from surefix.simulate.contamination import Trial, World, alone, columns, columns_beside, draw
 from surefix.types import Cleaned
 
 __all__ = ["clean_trial", "compare", "outcomes"]
@@ -113,7 +113,12 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
         sigma_position=wrong,
         sigma_height=wrong,
     )
-    return clean_sources(open_inputs([columns(trial)]), options, estimator)
+    beside = columns_beside(trial)
+    if trial.scenario.beside == "depth":
+        sources = open_inputs([columns(trial)], depth=beside)
+    else:
+        sources = open_inputs([*([beside] if beside else []), columns(trial)])
+    return clean_sources(sources, options, estimator)
 
 
 def _tasks(options: CompareOptions) -> Iterator[_Task]:

@@ -24,6 +24,7 @@ __all__ = [
     "RESTARTS",
     "VELOCITY_OUT",
     "VELOCITY_POOR",
+    "WALK",
     "Bank",
     "Found",
     "Prior",
@@ -53,6 +54,8 @@ RESTARTS: Final = 7 * RESTART
 """Any axis."""
 MANOEUVRE: Final = 16384
 """The highest rate changed at once, after the last observation before this one that was used."""
+WALK: Final = 32768
+"""The fix is in a drag, on the axes that are wrong."""
 
 POOR_WEIGHT: Final = 0.25
 """Weight of an observation that belongs to the track but is twice as noisy as usual."""
@@ -88,7 +91,13 @@ class Prior(NamedTuple):
         (`MOST_SENSORS`,) how fast the noise of the positions of each sensor follows what is
         observed: 1 over the number of observations remembered, 0 for not at all.
     row
-        Probability that a fix is wrong by itself if the two before it were.
+        Probability that a fix is wrong by itself if the two before it were; learnt, but a row is
+        never surer to go on than a run.
+    drag
+        Probability that the fixes of a sensor begin to wander off, beside velocities, in a stretch
+        of a few; 0: they never do.
+    steady
+        What wanders off more slowly is taken for a bias of the velocities, m/s.
     """
 
     isolated: float
@@ -104,6 +113,8 @@ class Prior(NamedTuple):
     sigma_velocity: float
     adapt: FloatArray = np.zeros(MOST_SENSORS)
     row: float = 0.3
+    drag: float = 0.0
+    steady: float = 0.0
 
 
 class Bank(NamedTuple):
@@ -127,7 +138,12 @@ class Bank(NamedTuple):
     began
         (k,) s, when its track began: the first fix, or the last jump.
     run
-        (k,) sensor whose fixes run with a common offset, −1 outside of runs.
+        (k,) sensor whose fixes run with a common offset or are in a drag, −1 outside of runs.
+    walks
+        (k,) bits of the axes that are in a drag, and whether it is certain; 0 outside of drags.
+    drift
+        (k, axes, 4) of the offset of a drag: rate, its covariance with the offset, its variance,
+        and when the last fix was seen.
     opened
         (k,) s, when that run began, or when another sensor last denied it.
     length
@@ -147,6 +163,8 @@ class Bank(NamedTuple):
         (`MOST_SENSORS`,) factor of the variances of positions, as adapted.
     announced
         (1,) s, the beginning of the track as it was last told.
+    heard
+        (`MOST_SENSORS`, 2·axes) s, when each sensor last observed each component.
     """
 
     time: FloatArray
@@ -157,6 +175,8 @@ class Bank(NamedTuple):
     seen: BoolArray
     began: FloatArray
     run: IntArray
+    walks: IntArray
+    drift: FloatArray
     opened: FloatArray
     length: IntArray
     faulty: IntArray
@@ -167,6 +187,7 @@ class Bank(NamedTuple):
     moved: FloatArray
     scale: FloatArray
     announced: FloatArray
+    heard: FloatArray
 
 
 class Trail(NamedTuple):
@@ -208,6 +229,8 @@ class Found(NamedTuple):
         (n,) s, where the likeliest hypothesis just took a run for a true jump: when that began.
     offset
         (n, axes) offset of the run that the epoch's fix belongs to; NaN if to none.
+    drag
+        (n,) whether that run is a drag.
     scale
         (n,) factor of the variance of the epoch's position, as adapted.
     """
@@ -220,6 +243,7 @@ class Found(NamedTuple):
     run: IntArray
     since: FloatArray
     offset: FloatArray
+    drag: BoolArray
     scale: FloatArray
 
 
@@ -235,6 +259,8 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.zeros((most, d), np.bool_),
         np.full(most, np.nan),
         np.full(most, -1, np.int64),
+        np.zeros(most, np.int64),
+        np.zeros((most, d, 4)),
         np.full(most, np.nan),
         np.zeros(most, np.int64),
         np.zeros(most, np.int64),
@@ -245,4 +271,5 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full(most, np.nan),
         np.ones(MOST_SENSORS),
         np.full(1, np.nan),
+        np.full((MOST_SENSORS, 2 * d), np.nan),
     )

@@ -17,8 +17,10 @@ from surefix.filters.hypotheses import (
     POOR_WEIGHT,
     RESTART,
     RESTARTS,
+    WALK,
     Bank,
     Found,
+    Prior,
 )
 from surefix.filters.hypothesis_axis import (
     HASTE,
@@ -32,6 +34,7 @@ from surefix.filters.hypothesis_axis import (
     update_axis,
 )
 from surefix.filters.hypothesis_density import log_sum, wrapped
+from surefix.filters.hypothesis_drags import CERTAIN, drag_axis, make_certain
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import BoolArray, FloatArray, IntArray
@@ -40,6 +43,7 @@ __all__ = ["apply_position", "best_of", "give_rows", "keep_best", "merge", "repo
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
 _NOUGHT = -37.0  # nats: what is less likely than the best by that adds nothing to a sum
+_AXES = 7  # bits of a code
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
 
 
@@ -56,8 +60,12 @@ def _copy(bank: Bank, to: int, k: int, d: int, n: int) -> None:
         bank.lost[to, a] = bank.lost[k, a]
         bank.missed[to, a] = bank.missed[k, a]
         bank.touched[to, a] = bank.touched[k, a]
+        if bank.walks[k]:
+            for j in range(4):
+                bank.drift[to, a, j] = bank.drift[k, a, j]
     bank.began[to] = bank.began[k]
     bank.run[to] = bank.run[k]
+    bank.walks[to] = bank.walks[k]
     bank.opened[to] = bank.opened[k]
     bank.length[to] = bank.length[k]
     bank.faulty[to] = bank.faulty[k]
@@ -169,6 +177,7 @@ def keep_best(
 @inner
 def apply_position(
     motion: Motion,
+    prior: Prior,
     bank: Bank,
     k: int,
     z: FloatArray,
@@ -182,14 +191,23 @@ def apply_position(
     n = motion.order + 1
     b = n - 1
     running = code & (OPEN | CONTINUE) != 0
-    if code & OPEN:
+    begins = 0
+    if bank.walks[k] and bank.run[k] == sensor:
+        bank.length[k] += 1
+    if code & WALK:
+        if bank.walks[k] == 0:
+            begins = 1 if bank.run[k] < 0 else 2
+            bank.walks[k] = code & _AXES
+            if begins == 1:
+                bank.run[k], bank.opened[k], bank.length[k] = sensor, time, 1
+    elif code & OPEN:
         bank.run[k] = sensor
         bank.opened[k] = time
         bank.length[k] = 1
     elif code & CONTINUE:
         bank.length[k] += 1
     elif code & (DROP | RESTARTS):
-        bank.run[k] = -1
+        bank.run[k], bank.walks[k] = -1, 0
     elif code & COMMIT:
         bank.run[k] = -1
         bank.began[k] = bank.opened[k]
@@ -219,6 +237,10 @@ def apply_position(
         else:
             bank.missed[k, a] = 0
         if (code >> a) & 1:
+            if code & WALK:
+                nu = wrapped(z[a] - m[0], motion.period)
+                bends = code & POOR != 0
+                drag_axis(motion, prior, bank, k, a, nu, variance[a], begins, bends, time)
             continue
         gap = time - bank.touched[k, a]
         bank.touched[k, a] = time
@@ -245,6 +267,10 @@ def apply_position(
             nu = wrapped(nu - m[b], motion.period)
         r = variance[a] / POOR_WEIGHT if code & POOR else variance[a]
         update_axis(m, P, n, 0, shifted, nu, r)
+    if code & WALK:
+        make_certain(prior, bank, k, b, time)
+        if begins == 2:
+            bank.walks[k] |= CERTAIN
 
 
 @inner
@@ -277,7 +303,7 @@ def _alike(motion: Motion, bank: Bank, i: int, j: int) -> bool:
     if bank.run[i] != bank.run[j] or bank.faulty[i] != bank.faulty[j]:
         return False
     running = bank.run[i] >= 0
-    if running and bank.opened[i] != bank.opened[j]:
+    if running and (bank.opened[i] != bank.opened[j] or bank.walks[i] != bank.walks[j]):
         return False
     b = motion.order
     distance = 0.0

@@ -18,6 +18,7 @@ from surefix.filters.hypotheses import (
     RESTART,
     VELOCITY_OUT,
     VELOCITY_POOR,
+    WALK,
     Bank,
     Prior,
 )
@@ -30,6 +31,13 @@ from surefix.filters.hypothesis_density import (
     wild_product,
     wrapped,
 )
+from surefix.filters.hypothesis_drags import (
+    drag_candidate,
+    dragged_axes,
+    leans,
+    outlasts,
+    supposes,
+)
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -40,6 +48,7 @@ __all__ = [
     "GROSS",
     "ROW",
     "position_branches",
+    "slipped",
     "velocity_branches",
 ]
 
@@ -52,6 +61,7 @@ CONFIRMED = 3
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
+_SLIPPED = 1.5  # variance of a velocity beside what it was off by in the mean, in its own
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
@@ -120,14 +130,16 @@ def velocity_branches(
             seen += 1
         outside = wild_product(square, wide, seen)
         bad, good = rarely, mostly
+        leaning = False  # a drag beside velocities that are wrong, too, explains everything
         if (bank.faulty[k] >> sensor) & 1:
+            leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
             bad, good = again, over
             alike = 0.0
             for a in range(d):
                 c = d + a
                 if not math.isnan(z[c]):
                     change = z[c] - bank.mean[k, a, 1] - bank.slip[k, a]
-                    alike += log_normal(change, bank.covariance[k, a, 1, 1] + 2.0 * variance[c])
+                    alike += log_normal(change, slipped(motion, bank, a, time, sensor, variance[c]))
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
@@ -135,11 +147,11 @@ def velocity_branches(
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
             total += 1
-        if not forced[d] > 0.0:
+        if not forced[d] > 0.0 and not leaning:
             score[total] = base + outside + bad
             parent[total], code[total] = i, VELOCITY_OUT
             total += 1
-        strange = math.isnan(forced[d]) and distance > _STRANGE
+        strange = math.isnan(forced[d]) and distance > _STRANGE and bank.walks[k] == 0
         if strange and prior.manoeuvre > 0.0:
             swift = _swift(motion, bank, k, 1, z[d:], variance[d:], time)
             if not math.isnan(swift):
@@ -147,6 +159,17 @@ def velocity_branches(
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
     return total
+
+
+@inner
+def slipped(motion: Motion, bank: Bank, a: int, time: float, sensor: int, r: float) -> float:
+    """Variance of how a wrong velocity of axis a differs from what it was off by before.
+
+    What the track's own velocity is off by is the same in both, but for what it changed meanwhile.
+    """
+    gap = _since(bank.heard[sensor, motion.axes + a], time)
+    change = reach(motion.order, 1, gap)
+    return 2.0 * motion.density[a] * gap * change * change + _SLIPPED * r
 
 
 @lean_helper
@@ -220,11 +243,13 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
+    drags = -1 if decided else supposes(prior, bank, place, sensor)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
         running, own = bank.run[k] >= 0, bank.run[k] == sensor
-        distance = near = square = offset = 0.0
+        walks = own and bank.walks[k] != 0
+        distance = near = square = offset = stray = 0.0
         volume = wider = whole = 1.0
         unknown = due = False
         for a in range(d):
@@ -250,6 +275,7 @@ def position_branches(
                     more = 2.0 * bank.covariance[k, a, 0, b] + bank.covariance[k, a, b, b]
                     nu = wrapped(nu - bank.mean[k, a, b], motion.period)
                     offset += log_normal(nu, S[a] + more)
+                    stray += nu * nu / (S[a] + more)
             distance += close[a]
             volume *= S[a]
             square += wild[a]
@@ -283,13 +309,32 @@ def position_branches(
             code[total] = POOR if poor else 0
             if running and belongs - offset > _PREFERS:
                 code[total] |= DENY
+            if i == drags:
+                dragged = dragged_axes(prior, bank, k, z, time, sensor)
+                if dragged:
+                    parent[total] = i
+                    score[total + 1] = base + agrees + math.log(prior.drag)
+                    code[total + 1] = WALK | dragged
+                    total += 1
         parent[total] = i
         total += 1
         outside = wild_product(square, whole, observed)
         score[total] = usual + outside + wrong
         parent[total], code[total] = i, mask
         total += 1
-        strange = distance > GROSS and not unknown
+        if walks and not outlasts(prior, bank, k, time):
+            goes_on, says = drag_candidate(motion, prior, bank, k, z, variance, time)
+            score[total] = base + goes_on + staying
+            parent[total], code[total] = i, says
+            total += 1
+        strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
+        if strange and not unknown:
+            dragged = dragged_axes(prior, bank, k, z, time, sensor)
+            if dragged:
+                score[total] = base + outside + burst
+                parent[total], code[total] = i, WALK | dragged
+                total += 1
+        strange = distance > GROSS and not unknown and not walks
         if strange and (own or not running):
             score[total] = base + outside + burst
             parent[total], code[total] = i, OPEN
@@ -301,11 +346,12 @@ def position_branches(
                 score[total] = base + swift + turned
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
-        if own and not unknown:
+        if own and not unknown and not walks:
             score[total] = base + offset + lasting
             parent[total], code[total] = i, CONTINUE
             total += 1
         confirms = running and not own and not unknown and bank.length[k] >= CONFIRMED
+        confirms = confirms and bank.walks[k] == 0
         if confirms and offset - belongs > _PREFERS:
             score[total] = base + offset + burst
             parent[total], code[total] = i, COMMIT
@@ -329,7 +375,7 @@ def position_branches(
                 total += 1
         if due:
             fresh, anew, every = _anew(prior, bank, k, z, variance, time, close, S)
-            if anew and (every or not own):
+            if anew and (every or not own) and (not walks or outlasts(prior, bank, k, time)):
                 score[total] = base + fresh
                 parent[total], code[total] = i, anew
                 total += 1

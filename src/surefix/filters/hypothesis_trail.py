@@ -17,13 +17,18 @@ from surefix.filters.hypotheses import (
     RESTARTS,
     VELOCITY_OUT,
     VELOCITY_POOR,
+    WALK,
     Trail,
 )
 from surefix.filters.records import Motion
 from surefix.jit import inner, kernel
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["Decisions", "decide", "follow", "runs", "undecided"]
+__all__ = ["DRAGGED", "Decisions", "decide", "follow", "runs", "undecided"]
+
+
+DRAGGED = 3
+"""Of a fix in a drag; in common with a run it has that its fixes are wrong together."""
 
 
 class Decisions(NamedTuple):
@@ -38,7 +43,7 @@ class Decisions(NamedTuple):
         (n,) bit mask of the axes whose position jumps before this epoch, and above them of those
         whose highest rate does.
     run
-        (n,) 1 where the fix belongs to a run with a common offset.
+        (n,) 1 where the fix belongs to a run with a common offset, `DRAGGED` where it is in a drag.
     """
 
     fixed: FloatArray
@@ -153,7 +158,7 @@ def decide(
             changed = k
         _write(decisions, k, code, motion.axes, inside)
         decisions.jump[k] = jump
-        decisions.run[k] = 1 if inside else 0
+        decisions.run[k] = DRAGGED if code & WALK else 1 if inside else 0
         if code & OPEN:
             committed = False
         for a in range(motion.axes):
@@ -193,7 +198,7 @@ def follow(motion: Motion, trail: Trail, head: int, slot: int, decisions: Decisi
         running = code & (OPEN | CONTINUE) != 0
         _write(decisions, k, code, motion.axes, running)
         decisions.jump[k] = 0
-        decisions.run[k] = 1 if running else 0
+        decisions.run[k] = DRAGGED if code & WALK else 1 if running else 0
         slot = best
     return n
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
 from surefix.jit import kernel
-from surefix.linalg import absorb, cholesky, solve_lower, triangularize
+from surefix.linalg import absorb, cholesky, multiply, solve_lower, triangularize
 from surefix.robust.loss import Loss, loss_named, weight
 from surefix.types import FloatArray, IntArray
 
@@ -192,7 +192,8 @@ def _update(
 ) -> None:
     """Weigh the groups, decorrelate what is left, absorb it one scalar at a time."""
     m, n = H.shape
-    seen_through = H @ x.factor
+    seen_through = np.empty((m, n))
+    multiply(H, x.factor, seen_through)
     component_weight = np.ones(m)
     for g in range(seen.weight.shape[0]):
         index = np.array([c for c in range(m) if group[c] == g and not np.isnan(seen.residual[c])])

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from surefix.errors import OptionsError
 from surefix.filters.kalman import Gaussian, gaussian
 from surefix.jit import helper, kernel
-from surefix.linalg import absorb, cholesky, triangularize
+from surefix.linalg import absorb, cholesky, multiply, triangularize
 from surefix.robust.loss import Loss, LossCode, loss_named, weight
 from surefix.types import FloatArray
 
@@ -249,8 +249,11 @@ def m_step(
         for k in range(n):
             change = max(change, abs(moved[k] - e[k]))
             e[k] = moved[k]
-    x += S @ e
-    S[:] = S @ D
+    root = S.copy()
+    multiply(root, D, S)
+    for k in range(n):
+        for l in range(n):
+            x[k] += root[k, l] * e[l]
     return done, change
 
 

@@ -44,6 +44,7 @@ def from_filtered(filtered: Filtered) -> Estimate:
         filtered.since,
         np.zeros(len(filtered.jump), np.int64),
         np.full((len(filtered.jump), filtered.standardised.shape[1] // 2), np.nan),
+        np.zeros(len(filtered.jump), np.bool_),
         np.ones(len(filtered.jump)),
     )
 

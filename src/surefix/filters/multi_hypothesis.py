@@ -25,6 +25,7 @@ from surefix.filters.hypotheses import (
     POOR_WEIGHT,
     VELOCITY_OUT,
     VELOCITY_POOR,
+    WALK,
     Bank,
     Found,
     Prior,
@@ -49,9 +50,12 @@ from surefix.filters.hypothesis_bank import (
 )
 from surefix.filters.hypothesis_branches import (
     CONFIRMED,
+    GROSS,
     position_branches,
+    slipped,
     velocity_branches,
 )
+from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
@@ -61,7 +65,8 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
-_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced"})
+_LEARNS = 0.5  # of how much a velocity is off by a further one that is off alike
+_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard"})
 
 
 @inner
@@ -78,10 +83,17 @@ def _apply_velocity(
     """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
     if code & VELOCITY_OUT:
-        bank.faulty[i] |= bit
+        distance = 0.0
         for a in range(d):
             if not math.isnan(z[d + a]):
-                bank.slip[i, a] = z[d + a] - bank.mean[i, a, 1]
+                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
+                distance += off * off / slipped(motion, bank, a, time, sensor, r[d + a])
+        alike = bank.faulty[i] & bit and distance < GROSS
+        for a in range(d):
+            if not math.isnan(z[d + a]):
+                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
+                bank.slip[i, a] += _LEARNS * off if alike else off
+        bank.faulty[i] |= bit
         return
     bank.faulty[i] &= ~bit
     weight = POOR_WEIGHT if code & VELOCITY_POOR else 1.0
@@ -117,7 +129,7 @@ def _commit_lasting(
     """Take the runs for true jumps that last too long, or longer than the track before them."""
     for i in range(bank.number[0]):
         k = place[i]
-        if bank.run[k] < 0 or bank.length[k] < CONFIRMED:
+        if bank.run[k] < 0 or bank.length[k] < CONFIRMED or bank.walks[k]:
             continue
         longest = min(prior.longest, bank.opened[k] - bank.began[k])
         if time - bank.opened[k] >= longest:
@@ -179,7 +191,8 @@ def _judge(
                 out.weight[k, d + a] += velocity
     best = best_of(bank.weight, bank.number[0])
     row = place[best]
-    if said[best] & (OPEN | CONTINUE) and not said[best] & COMMIT:
+    out.drag[k] = said[best] & WALK != 0
+    if said[best] & (OPEN | CONTINUE | WALK) and not said[best] & COMMIT:
         out.run[k] = bank.length[row]
         for a in range(d):
             out.offset[k, a] = bank.mean[row, a, motion.order]
@@ -235,6 +248,9 @@ def _run(
                 for a in range(d):
                     m, P = bank.mean[place[i], a], bank.covariance[place[i], a]
                     predict_axis(m, P, motion.order, dt, motion.density[a])
+                    if (bank.walks[place[i]] >> a) & 1:
+                        drift = bank.drift[place[i], a]
+                        predict_drag(m, P, drift, motion.order, dt, prior.longest)
         innovate(motion, bank, place, k, z, r, found, work.noise)
         for stage in range(2):
             if stage == 0 and moved:
@@ -270,8 +286,24 @@ def _run(
                 )
             else:
                 continue
+            if stage == 1:
+                cap_drags(prior, bank, place, work.score, work.parent, work.code, total)
             count, norm = keep_best(work.score, total, work.chosen, bank.weight)
             found.evidence[k] += norm
+            if prior.drag > 0.0:
+                count = keep_drags(
+                    bank,
+                    place,
+                    work.score,
+                    work.parent,
+                    work.code,
+                    total,
+                    sensor,
+                    work.chosen,
+                    count,
+                    bank.weight,
+                    work.claims,
+                )
             for i in range(bank.number[0]):
                 work.before[i], work.spoken[i] = work.origin[i], said[i]
             give_rows(
@@ -282,7 +314,7 @@ def _run(
                 work.origin[i] = work.before[p]
                 said[i] = work.spoken[p] | what
                 if stage == 1:
-                    apply_position(motion, bank, place[i], z, r, what, time, sensor, speed)
+                    apply_position(motion, prior, bank, place[i], z, r, what, time, sensor, speed)
                 else:
                     _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
         _commit_lasting(motion, prior, bank, place, time, said)
@@ -300,6 +332,9 @@ def _run(
                 trail.code[begin + i] = said[i]
             trail.first[k + 1] = begin + bank.number[0]
         report(motion, bank, place, work.share, said, best, k, found)
+        for c in range(2 * d):
+            if not math.isnan(z[c]):
+                bank.heard[sensor, c] = time
         bank.time[0] = time
 
 
@@ -357,5 +392,6 @@ def _blank(motion: Motion, n: int) -> Found:
         np.zeros(n, np.int64),
         np.full(n, np.nan),
         np.full((n, motion.axes), np.nan),
+        np.zeros(n, np.bool_),
         np.ones(n),
     )

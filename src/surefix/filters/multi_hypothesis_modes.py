@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
+from surefix.filters.hypothesis_disputes import settle_velocities
 from surefix.filters.hypothesis_lag import (
     Followed,
     filter_decided,
@@ -18,6 +19,7 @@ from surefix.filters.hypothesis_lag import (
 )
 from surefix.filters.hypothesis_review import deleted_residuals, review
 from surefix.filters.hypothesis_trail import (
+    DRAGGED,
     Decisions,
     decide,
     follow,
@@ -62,6 +64,7 @@ def realtime_hypotheses(
         since,
         found.run,
         found.offset,
+        found.drag,
         found.scale,
     )
 
@@ -131,6 +134,7 @@ def _lagged(
         np.full((n, motion.groups), np.nan),
         said.run,
         np.full((n, motion.axes), np.nan),
+        said.run == DRAGGED,
         np.ones(n),
     )
 
@@ -169,15 +173,17 @@ def decide_offline(
         As for the filter; at least one epoch.
     """
     recovery, n = _steady(prior), len(epochs.time)
-    ahead = _decided(motion, prior, epochs)
-    back = _decided(motion, prior, backward(motion, epochs))
-    said = Decisions(
-        np.minimum(ahead.fixed, back.fixed[::-1]),
-        _in_both(epochs.time, ahead.jump, back.jump[::-1], prior.longest),
-        ahead.run & back.run[::-1],
-    )
+    ahead, evidence = _decided(motion, prior, epochs)
+    turned, reverse = _decided(motion, prior, backward(motion, epochs))
+    back = Decisions(*(field[::-1] for field in turned))
+    jump = _in_both(epochs.time, ahead.jump, back.jump, prior.longest)
+    ahead, back = _settled(epochs.time, ahead, back, evidence - reverse[::-1], prior.longest)
     d = motion.axes
-    slipped = np.maximum(ahead.fixed[:, d], back.fixed[::-1, d]) == 0.0
+    slips = ahead.fixed[:, d] == 0.0, back.fixed[:, d] == 0.0
+    slipped, used = settle_velocities(motion, prior, epochs, *slips)
+    fixed = np.minimum(ahead.fixed, back.fixed)
+    fixed[used, d:] = np.maximum(ahead.fixed, back.fixed)[used, d:]
+    said = Decisions(fixed, jump, ahead.run & back.run)
     locked = np.column_stack([said.run > 0, slipped])
     for _ in range(_SWEEPS):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
@@ -224,12 +230,43 @@ def _filter(
     )
 
 
-def _decided(motion: Motion, prior: Prior, epochs: Epochs) -> Decisions:
-    """What the likeliest hypothesis at the end of the series says of all of it."""
-    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
+def _decided(motion: Motion, prior: Prior, epochs: Epochs) -> tuple[Decisions, FloatArray]:
+    """What the likeliest hypothesis at the end of the series says of all of it, and the evidence.
+
+    That is how likely all hypotheses together made each epoch.
+    """
+    _, found, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
     said = undecided(motion, len(epochs.time))
     decide(motion, np.isfinite(epochs.z), trail, len(epochs.time) - 1, 0, said)
-    return said
+    return said, found.evidence
+
+
+def _settled(
+    time: FloatArray, ahead: Decisions, back: Decisions, better: FloatArray, margin: float
+) -> tuple[Decisions, Decisions]:
+    """Let the direction that has the likelier account decide where both differ about a drag.
+
+    Parameters
+    ----------
+    better
+        (n,) by how much the evidence of each epoch is greater ahead.
+    margin
+        What lies so close about a drag belongs to it, s.
+    """
+    either = (ahead.run == DRAGGED) | (back.run == DRAGGED)
+    rows = np.flatnonzero(either)
+    cuts = np.flatnonzero(np.diff(time[rows]) > 2.0 * margin) + 1
+    for part in np.split(rows, cuts) if len(rows) else []:
+        both = ((ahead.run[part] == DRAGGED) & (back.run[part] == DRAGGED)).sum()
+        if 2 * both > len(part):
+            continue
+        first = int(np.searchsorted(time, time[part[0]] - margin))
+        last = int(np.searchsorted(time, time[part[-1]] + margin, side="right"))
+        here = slice(first, last)
+        one, other = (ahead, back) if better[here].sum() >= 0.0 else (back, ahead)
+        for field, loser in zip(one[::2], other[::2], strict=True):
+            loser[here] = field[here]
+    return ahead, back
 
 
 def _in_both(time: FloatArray, ahead: IntArray, back: IntArray, apart: float) -> IntArray:
@@ -265,7 +302,9 @@ def _named(motion: Motion, epochs: Epochs, said: Decisions, whole: Estimate) -> 
         count = np.bincount(run[known], minlength=len(run))
         inside = known & (count[run] > 0)
         offset[inside, a] = total[run[inside]] / count[run[inside]]
-    return whole._replace(jump=said.jump, since=since, run=length, offset=offset)
+    drag = said.run == DRAGGED
+    offset[drag] = off[drag]
+    return whole._replace(jump=said.jump, since=since, run=length, offset=offset, drag=drag)
 
 
 def _with_fixes(since: FloatArray, fix: BoolArray) -> FloatArray:

@@ -160,6 +160,8 @@ class Estimate(NamedTuple):
         (n,) fixes of the run with a common offset that the epoch's fix belongs to; 0 if to none.
     offset
         (n, axes) that offset; NaN outside of runs.
+    drag
+        (n,) whether that run is a drag: the offset is that of the fix alone.
     scale
         (n,) factor of the variance of the epoch's position since it was settled, 1 if it stays.
     """
@@ -173,4 +175,5 @@ class Estimate(NamedTuple):
     since: FloatArray
     run: IntArray
     offset: FloatArray
+    drag: BoolArray
     scale: FloatArray

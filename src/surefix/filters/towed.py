@@ -17,7 +17,7 @@ from surefix.errors import OptionsError
 from surefix.filters.kalman import Gaussian
 from surefix.filters.m_estimation import check_losses, m_step
 from surefix.jit import helper, kernel
-from surefix.linalg import multiply_transpose, triangularize
+from surefix.linalg import multiply, multiply_transpose, triangularize
 from surefix.models.towed import (
     OBSERVED,
     TowedModel,
@@ -243,7 +243,7 @@ def _predict(
     fill_transition(F, heading, speed, model.beta, dt)
     _move(x.mean, F, dt, rates)
     A[:] = 0.0
-    A[:, :6] = F @ x.factor
+    multiply(F, x.factor, A[:, :6])
     add_noise_factor(A, heading, speed, dt, model, 6)
     triangularize(A, 6, 16)
     x.factor[:] = A[:, :6]

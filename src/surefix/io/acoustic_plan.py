@@ -7,7 +7,6 @@ answer depends neither on the mode nor on where the log is cut.
 
 from __future__ import annotations
 
-from collections import Counter
 from math import isnan
 from pathlib import Path
 from typing import NamedTuple
@@ -23,10 +22,12 @@ from surefix.io.nmea_epoch import source
 from surefix.io.nmea_frame import START, Frame, finish, frame
 from surefix.io.nmea_record import Heading, Position
 
-__all__ = ["SHIP", "Plan", "described", "is_acoustic", "plan_of"]
+__all__ = ["FIRST", "SHIP", "Plan", "Seen", "described", "is_acoustic", "plan_of"]
 
 SHIP = "ship"
 """Target that means the ship's own positions."""
+FIRST = "first"
+"""Target of a stream that means the transponder that is heard first."""
 
 _MARKS = (b"$PSIMS", b"$PTSA", b"$PSONLLD,", b"$PSONALL,", b"+++AT:", b"velocity_valid")
 _LONGEST = max(map(len, _MARKS))
@@ -122,69 +123,100 @@ def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan |
     OptionsError
         The log has no such target.
     """
-    seen = _Seen(require_checksum)
+    seen = Seen()
     state = START
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
             state, frames = frame(state, block)
-            seen.add(frames)
-    seen.add(finish(state))
-    return seen.plan(path, target)
+            _look(seen, frames, require_checksum)
+    _look(seen, finish(state), require_checksum)
+    if target is not None and target != SHIP and target not in seen.targets:
+        known = ", ".join([*seen.ranked(), *([SHIP] if seen.sources else [])])
+        raise OptionsError(
+            f"target {target!r} for {path}", f"one of {known}" if known else "no target"
+        )
+    return seen.plan(target)
 
 
-class _Seen:
-    """What has been met, and how often."""
+def _look(seen: Seen, frames: list[Frame], require_checksum: bool) -> None:
+    for _, _, text, problem in frames:
+        if problem is None:
+            record = parse(text, require_checksum=require_checksum)
+        elif problem == "not-nmea" and (told := read_line(text)) is not None:
+            record = told[1]
+        else:
+            continue
+        if isinstance(record, Sighting):
+            seen.sighted(record)
+        elif isinstance(record, Position):
+            seen.fixed(record)
+        elif isinstance(record, Heading):
+            seen.turned(record.type, record.true)
+        elif isinstance(record, Attitude):
+            seen.turned(record.type, record.heading)
 
-    def __init__(self, require_checksum: bool) -> None:
-        self._require_checksum = require_checksum
-        self._targets: dict[str, Counter[Place]] = {}
-        self._sources: Counter[str] = Counter()
-        self._headings: set[int] = set()
 
-    def add(self, frames: list[Frame]) -> None:
-        for _, _, text, problem in frames:
-            if problem is None:
-                record = parse(text, require_checksum=self._require_checksum)
-            elif problem == "not-nmea" and (told := read_line(text)) is not None:
-                record = told[1]
-            else:
-                continue
-            if isinstance(record, Sighting):
-                self._targets.setdefault(record.target, Counter())[record.place] += record.valid
-            elif isinstance(record, Position):
-                self._sources[source(record.talker)] += record.valid
-            elif isinstance(record, Heading | Attitude):
-                heading = record.true if isinstance(record, Heading) else record.heading
-                if not isnan(heading):
-                    self._headings.add(HEADINGS[record.type])
+class Seen:
+    """What has been met of a log, and how often; plain data.
 
-    def plan(self, path: Path, target: str | None) -> Plan | None:
-        names = sorted(self._targets, key=lambda name: -self._worth(name))
-        if target is not None and target not in names and target != SHIP:
-            known = ", ".join([*names, *([SHIP] if self._sources else [])])
-            raise OptionsError(
-                f"target {target!r} for {path}", f"one of {known}" if known else "no target"
-            )
+    Attributes
+    ----------
+    targets
+        How many valid sightings there are of each target, by what they are in.
+    sources
+        How many valid positions of the ship, by their source.
+    headings
+        Ranks of the true headings.
+    """
+
+    def __init__(self) -> None:
+        self.targets: dict[str, dict[Place, int]] = {}
+        self.sources: dict[str, int] = {}
+        self.headings: set[int] = set()
+
+    def sighted(self, record: Sighting) -> None:
+        """Count a sighting."""
+        places = self.targets.setdefault(record.target, {})
+        places[record.place] = places.get(record.place, 0) + record.valid
+
+    def fixed(self, record: Position) -> None:
+        """Count a position of the ship."""
+        name = source(record.talker)
+        self.sources[name] = self.sources.get(name, 0) + record.valid
+
+    def turned(self, kind: str, heading: float) -> None:
+        """Note that a kind of sentence tells the true heading, degrees."""
+        if not isnan(heading):
+            self.headings.add(HEADINGS[kind])
+
+    def ranked(self) -> list[str]:
+        """Targets, the one that is seen most often first."""
+        return sorted(self.targets, key=lambda name: -self._worth(name))
+
+    def plan(self, target: str | None) -> Plan | None:
+        """How the sightings of a target, None: of the likeliest, become fixes; None: the ship's."""
+        names = self.ranked()
         below = [name for name in names if not name.lower().startswith(SHIP)] or names
         chosen = target or (below[0] if below else SHIP)
         if chosen not in names:
             return None
-        ship = next((name for name, total in self._sources.most_common() if total), "")
-        heading = min(self._headings, default=_NO_RANK)
-        place = _place(self._targets[chosen], bool(ship), heading < _NO_RANK)
+        found = sorted(self.sources.items(), key=lambda item: -item[1])
+        ship = next((name for name, total in found if total), "")
+        heading = min(self.headings, default=_NO_RANK)
+        place = _place(self.targets[chosen], bool(ship), heading < _NO_RANK)
         others = tuple(name for name in names if name != chosen)
         return Plan(chosen, place, ship, heading, others)
 
     def _worth(self, name: str) -> float:
         """Valid sightings of a target; one that was filtered counts as half a measured one."""
-        return self._targets[name].total() / (2 if name.endswith(NOT_MEASURED) else 1)
+        return sum(self.targets[name].values()) / (2 if name.endswith(NOT_MEASURED) else 1)
 
 
-def _place(seen: Counter[Place], ship: bool, heading: bool) -> Place:
+def _place(seen: dict[Place, int], ship: bool, heading: bool) -> Place:
     """The most that can be said of where a target is, from how it was seen."""
-    turned = seen["north"] or (seen["ship"] and heading)
-    if seen["globe"] or (turned and ship):
+    turned = seen.get("north") or (seen.get("ship") and heading)
+    if seen.get("globe") or (turned and ship):
         return "globe"
-    if seen["grid"]:
+    if seen.get("grid"):
         return "grid"
     return "north" if turned else "ship"

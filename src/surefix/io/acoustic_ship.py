@@ -55,6 +55,10 @@ class Ship:
     headings: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_KEPT))
     decimals: int = -9
 
+    def copy(self) -> Ship:
+        """One that goes on by itself from here."""
+        return Ship(self.fixes.copy(), self.headings.copy(), self.decimals)
+
     def at(self, record: Position, time: float) -> None:
         """Take a fix; of several at one time the one with most decimals counts."""
         if not record.valid or math.isnan(time):

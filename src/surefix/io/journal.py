@@ -250,6 +250,8 @@ def journal_logs(
 ) -> list[tuple[str, str, Iterator[Log]]]:
     """Open the inputs of a journal for reading: name and role of each, and its parts.
 
+    The role in the journal may name an acoustic target: ``fixes of B01``.
+
     Raises
     ------
     InputError
@@ -257,8 +259,8 @@ def journal_logs(
     """
     journal = open_journal(url, new=False)
 
-    def parts(number: int, name: str) -> Iterator[Log]:
-        stream = NmeaStream(Path(name), require_checksum)
+    def parts(number: int, name: str, target: str | None) -> Iterator[Log]:
+        stream = NmeaStream(Path(name), require_checksum, target)
         for piece in journal.received(source=number):
             if piece.data:
                 yield stream.read(piece.data, piece.time)
@@ -267,7 +269,11 @@ def journal_logs(
     sources = journal.sources()
     if not sources:
         raise InputError(f"{url}: a data base without inputs", "a journal of surefix live")
-    return [(name, role, parts(i, name)) for i, (name, role) in enumerate(sources)]
+    tasks = [(name, *task.partition(" of ")) for name, task in sources]
+    return [
+        (name, role, parts(i, name, target or None))
+        for i, (name, role, _, target) in enumerate(tasks)
+    ]
 
 
 def _row(record: Received | Told) -> dict[str, object]:

@@ -8,6 +8,7 @@ are one source; GN, which uses them all, is preferred.
 
 from __future__ import annotations
 
+import copy
 from array import array
 from collections import deque
 from math import cos, isnan, nan, radians, sin
@@ -53,6 +54,12 @@ class _Row:
         self.received = nan
         self.latitude = self.longitude = self.height = self.speed = self.course = nan
         self.east = self.north = self.up = nan
+
+    def copy(self) -> _Row:
+        """One that grows by itself."""
+        other = copy.copy(self)
+        other.seen, other.invalid = [*self.seen], [*self.invalid]
+        return other
 
     def add(self, record: Position) -> None:
         """Take from the sentence what is better than what is there."""
@@ -101,6 +108,17 @@ class Epochs:
         """Complete the rows that began before a time."""
         while self._open and self._open[0].time < before:
             self._close(self._open.popleft())
+
+    def copy(self) -> Epochs:
+        """One that goes on by itself from here."""
+        other = copy.copy(self)
+        vars(other).update(
+            sources=[*self.sources],
+            _open=deque(row.copy() for row in self._open),
+            _values=self._values[:],
+            _marks=self._marks[:],
+        )
+        return other
 
     def add(self, record: Position, time: float, received: float) -> None:
         """Put a position sentence into its row, or begin one.

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from array import array
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-
 from surefix.io.acoustic_clock import CALENDAR, DeviceClock
 from surefix.io.acoustic_line import read_line
-from surefix.io.acoustic_plan import Plan, described
+from surefix.io.acoustic_plan import SHIP, Plan, described
 from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
 from surefix.io.acoustic_rows import Sightings
 from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
-from surefix.io.nmea_epoch import Epochs
+from surefix.io.nmea_epoch import Epochs, source
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
 from surefix.io.nmea_lines import Plain
 from surefix.io.nmea_record import (
@@ -34,17 +32,17 @@ from surefix.io.nmea_record import (
     Sigma,
     WaterSpeed,
 )
-from surefix.types import Channel, Event, Log, Problem
+from surefix.io.nmea_series import Series
+from surefix.types import Event, Log, Problem
 
 __all__ = ["NmeaStream"]
 
 _UNDATED = 500  # rows of a stream that wait for the first date
 _STATE = (
-    "_framing", "_clock", "_epochs", "_devices", "_samples", "_channels", "_counts", "_problems",
-    "_reported", "_line",
+    "_framing", "_clock", "_epochs", "_devices", "_channels", "_delays", "_counts",
+    "_problems", "_reported", "_line", "_led",
 )  # fmt: skip
 _SAMPLES_PER_FIX = 10  # a chunk also ends after so many channel samples per fix it may hold
-_ANGLES = frozenset({"heading_deg", "heading_magnetic_deg", "course_deg"})
 
 
 class NmeaStream:
@@ -57,27 +55,32 @@ class NmeaStream:
     require_checksum
         As for `read_nmea`.
     plan
-        Which acoustic target's sightings are its fixes, and how; None: those of its receivers.
+        Which acoustic target's sightings are its fixes, and how; of a stream, which is not looked
+        through before, the target alone, or `FIRST`. None: the fixes are those of its receivers.
     """
 
-    def __init__(self, path: Path, require_checksum: bool = True, plan: Plan | None = None) -> None:
+    def __init__(
+        self, path: Path, require_checksum: bool = True, plan: Plan | str | None = None
+    ) -> None:
         self._path = path
         self._framing = START
         self._arrival = math.nan
+        self._live = False  # whether it comes in pieces, and not from a file
         self._require_checksum = require_checksum
         self._clock = LogClock()
-        self._plan = plan
-        self._sightings = None if plan is None else Sightings(plan)
-        self._epochs = Epochs() if self._sightings is None else self._sightings
+        self._epochs = Epochs() if plan is None or plan == SHIP else Sightings(plan)
         self._led = math.nan  # time that a device has given to the log
         self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
-        self._samples = 0
-        self._channels: dict[tuple[str, str], tuple[array[float], array[float]]] = {}
+        self._channels, self._delays = Series(), Series()
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
         self._coming: Iterator[Frame | tuple[int, float, Record]] = iter(())
         self._reported: set[str] = set()
         self._line = 0
+        self._bind()
+
+    def _bind(self) -> None:
+        """Say who takes a record."""
         self._take: dict[type, Callable[..., bool | None]] = {
             Position: self._position,
             Motion: self._motion,
@@ -101,12 +104,44 @@ class NmeaStream:
         """Go on from a state of a stream of the same name and plan."""
         for name in _STATE:
             setattr(self, name, state[name])
-        self._take[Sigma] = self._epochs.declare
+        self._bind()
+
+    def copy(self) -> NmeaStream:
+        """One that goes on by itself from here, between two pieces."""
+        other = NmeaStream(self._path, self._require_checksum)
+        other.resume(
+            self.state
+            | {
+                "_clock": copy.copy(self._clock),
+                "_epochs": self._epochs.copy(),
+                "_devices": {name: copy.copy(clock) for name, clock in self._devices.items()},
+                "_channels": self._channels.copy(),
+                "_delays": self._delays.copy(),
+                "_counts": {**self._counts},
+                "_problems": {**self._problems},
+                "_reported": {*self._reported},
+            }
+        )
+        return other
+
+    @property
+    def _sightings(self) -> Sightings | None:
+        return self._epochs if isinstance(self._epochs, Sightings) else None
+
+    @property
+    def newest(self) -> float:
+        """s, of the latest sentence: its own time, or that of its reception; NaN before any."""
+        return self._clock.now()
+
+    @property
+    def count(self) -> int:
+        """Rows begun so far."""
+        return self._epochs.count
 
     @property
     def size(self) -> float:
         """Rows that a chunk would hold, or their equivalent in samples."""
-        return max(len(self._epochs), self._samples / _SAMPLES_PER_FIX)
+        return max(len(self._epochs), self._channels.count / _SAMPLES_PER_FIX)
 
     @property
     def begun(self) -> list[tuple[str, int, float, bool]]:
@@ -118,7 +153,7 @@ class NmeaStream:
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
 
-        As long as there is no date, up to 500 rows wait for one.
+        As long as there is neither a date nor a time of reception, up to 500 rows wait for one.
 
         Parameters
         ----------
@@ -127,10 +162,11 @@ class NmeaStream:
         arrival
             s, Unix, when it arrived; it is the time of reception of lines that do not say one.
         """
-        self._arrival = arrival
+        self._arrival, self._live = arrival, True
         self._framing, frames = frame(self._framing, data)
         self._read(frames)
-        if self._clock.dated or self.size >= _UNDATED:
+        received = not math.isnan(self._clock.receive)
+        if self._clock.dated or received or self.size >= _UNDATED:
             return self.chunk()
         return Log(source=str(self._path))
 
@@ -209,39 +245,31 @@ class NmeaStream:
             source=str(self._path),
             fixes=self._epochs.take(last),
             sensors=tuple(f"{self._path.stem} {name}" for name in self._epochs.sources),
-            channels=tuple(self._series()),
+            channels=tuple(self._channels.told(self._path.stem)),
             problems=tuple(self._told()),
             events=tuple(self._events()),
             counts=self._counts,
+            delays=tuple(self._delays.told(self._path.stem)),
             depth_positive_down=self._sightings is not None,
         )
-        self._channels, self._samples, self._problems, self._counts = {}, 0, {}, {}
+        self._channels, self._delays = Series(), Series()
+        self._problems, self._counts = {}, {}
         self._clock.settle()
         return log
 
     def _told(self) -> Iterator[Problem]:
         for kind, (total, example) in self._problems.items():
             yield Problem(kind, total, example, REMEDIES[kind])
-        lost = self._sightings.lost if self._sightings is not None else []
-        if lost and self._plan is not None:
-            example = f"{self._plan.target} at {lost[0]:.1f} s"
+        if self._sightings is not None and (lost := self._sightings.lost):
+            example = f"{self._sightings.sources[0]} at {lost[0]:.1f} s"
             yield Problem("unplaced", len(lost), example, REMEDIES["unplaced"])
             lost.clear()
 
-    def _series(self) -> Iterator[Channel]:
-        for (name, sensor), (time, value) in self._channels.items():
-            yield Channel(
-                name=name,
-                sensor=f"{self._path.stem} {sensor}",
-                time=np.array(time, dtype=np.float64),
-                value=np.array(value, dtype=np.float64),
-                period=360.0 if name in _ANGLES else 0.0,
-            )
-
     def _events(self) -> Iterator[Event]:
-        if self._plan is not None and "plan" not in self._reported:
+        plan = None if self._sightings is None else self._sightings.plan
+        if plan is not None and "plan" not in self._reported:
             self._reported.add("plan")
-            yield Event("note", math.nan, described(self._plan))
+            yield Event("note", math.nan, described(plan))
         count = self._clock.rollovers
         if count and "rollover" not in self._reported:
             self._reported.add("rollover")
@@ -274,27 +302,23 @@ class NmeaStream:
         time = self._clock.at(second, day)
         if self._clock.shift:
             self._epochs.shift(self._clock.shift)
-            for times, _ in self._channels.values():
-                shifted = np.frombuffer(times, dtype=np.float64)
-                shifted += self._clock.shift
+            self._channels.shift(self._clock.shift)
             self._clock.shift = 0.0
         return time
 
-    def _sample(self, name: str, sensor: str, time: float, value: float) -> None:
-        series = self._channels.get((name, sensor))
-        if series is None:
-            series = self._channels[name, sensor] = array("d"), array("d")
-        series[0].append(time)
-        series[1].append(value)
-        self._samples += 1
+    def _delay(self, sensor: str, time: float) -> None:
+        """Note how long after its validity an observation was received."""
+        if self._live and not math.isnan(self._clock.receive - time):
+            self._delays.add("delay_s", sensor, self._clock.receive, self._clock.receive - time)
 
     def _position(self, record: Position) -> None:
         time = self._instant(record.second, record.day)
         self._epochs.add(record, time, self._clock.receive)
+        self._delay(source(record.talker), time)
         if record.type == "RMC":
             sensor = record.talker + "RMC"
-            self._sample("speed_mps", sensor, time, record.speed)
-            self._sample("course_deg", sensor, time, record.course)
+            self._channels.add("speed_mps", sensor, time, record.speed)
+            self._channels.add("course_deg", sensor, time, record.course)
 
     def _motion(self, record: Motion) -> None:
         self._epochs.move(record, self._clock.receive)
@@ -306,20 +330,22 @@ class NmeaStream:
             time = self._instant(record.second, record.day)
         else:
             time = self._device(record.type, record.measured, record.told)
+        self._delay(record.target, time)
         return None if self._sightings is None else self._sightings.see(record, time)
 
     def _attitude(self, record: Attitude) -> None:
         time = self._instant(record.second, None)
-        self._sample("heading_deg", record.type, time, record.heading)
+        self._channels.add("heading_deg", record.type, time, record.heading)
         if self._sightings is not None:
             self._sightings.turn(record.type, record.heading, time)
 
     def _body_velocity(self, record: BodyVelocity) -> None:
         time = self._device(record.type, record.measured, record.told)
-        self._sample("forward_mps", record.type, time, record.forward)
-        self._sample("starboard_mps", record.type, time, record.starboard)
-        self._sample("down_mps", record.type, time, record.down)
-        self._sample("velocity_sigma_mps", record.type, time, record.sigma)
+        self._delay(record.type, time)
+        self._channels.add("forward_mps", record.type, time, record.forward)
+        self._channels.add("starboard_mps", record.type, time, record.starboard)
+        self._channels.add("down_mps", record.type, time, record.down)
+        self._channels.add("velocity_sigma_mps", record.type, time, record.sigma)
 
     def _device(self, name: str, measured: float, told: float) -> float:
         """Instant of a measurement; a device's calendar dates a log that has no time yet."""
@@ -361,4 +387,4 @@ class NmeaStream:
     def _samples_of(self, record: Record, **values: float) -> None:
         time, sensor = self._clock.now(), record.talker + record.type
         for name, value in values.items():
-            self._sample(name, sensor, time, value)
+            self._channels.add(name, sensor, time, value)

@@ -33,6 +33,7 @@ _KNOT = 1852.0 / 3600.0
 _DAY = 8_640_000  # hundredths of a second
 _MINUTE = 1_000_000  # steps of a minute of arc that are written
 _YEARS = 315_532_800, 3_471_292_800  # Unix s, 1980 up to 2080
+_LATEST = 1e12  # s; an instant beyond it is none
 _MOST_M = 99_999.99
 
 
@@ -106,7 +107,7 @@ def sentences(epoch: Epoch, *, talker: str = TALKER, types: tuple[str, ...] = TY
     unknown = [name for name in types if name not in _BODIES]
     if unknown:
         raise OptionsError(f"sentence type {unknown[0]!r}", "one of " + ", ".join(_BODIES))
-    if not math.isfinite(epoch.time):
+    if not abs(epoch.time) < _LATEST:
         return b""
     bodies = (_BODIES[name](epoch) for name in _BODIES if name in types)
     return b"".join(_sealed(talker + body) for body in bodies if body)

@@ -208,19 +208,12 @@ def open_log(
     except OSError as error:
         raise InputError(f"{place}: {error.strerror}", "a readable file") from error
     if sniff(head):
-        logs = read_nmea(place, require_checksum=require_checksum, target=target, progress=progress)
-        return logs if role == "velocity" else map(_without_sigma, logs)
+        return read_nmea(place, require_checksum=require_checksum, target=target, progress=progress)
     if target is not None:
         raise OptionsError(
             f"target {target!r} for {place}", "a log of an acoustic positioning system"
         )
     return read_table(place, mapping=columns, role=role, sensor=place.stem, progress=progress)
-
-
-def _without_sigma(log: Log) -> Log:
-    """A log without the standard deviations of its body velocities: they are no series."""
-    kept = tuple(channel for channel in log.channels if channel.name != _SIGMA)
-    return log if len(kept) == len(log.channels) else replace(log, channels=kept)
 
 
 def _earth_frame(logs: Iterator[Log], turning: list[Log] | None) -> Iterator[Log]:

@@ -28,6 +28,7 @@ from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
 
 _WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
+_NO_SERIES = "velocity_sigma_mps"  # what a sensor declares of its velocities is not one
 
 
 class Chunk(NamedTuple):
@@ -121,6 +122,8 @@ def merge(
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
     inflow, events = _order(inflow, fixes, options.reorder_s)
+    if log is not None and inflow.role == "heading":
+        inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     inflows = [*merging.inflows]
     inflows[source] = inflow
     least = max((each.last_tau for each in inflows if not each.ended), default=np.inf)
@@ -133,7 +136,8 @@ def merge(
     after = merging._replace(inflows=tuple(inflows), sensors=tuple(sensors), released=released)
     if log is None:
         return after, Chunk(rows, (), events, (), False)
-    channels = log.channels if inflow.role in _WITH_CHANNELS else ()
+    channels = tuple(each for each in log.channels if each.name != _NO_SERIES)
+    channels = channels if inflow.role in _WITH_CHANNELS else ()
     events = (*log.events, *events)
     return after, Chunk(rows, channels, events, log.problems, log.depth_positive_down)
 
@@ -144,10 +148,15 @@ def _number(sensors: list[str], name: str) -> int:
     return sensors.index(name)
 
 
+def _reached(log: Log, before: float) -> float:
+    """How far an input of headings has come, s: it has no rows that would tell."""
+    return max((float(np.nanmax(c.time, initial=before)) for c in log.channels), default=before)
+
+
 def _supporting(log: Log, role: str) -> Fixes | None:
     """The fixes of a log; a depth series becomes observations of the height alone."""
     if role != "depth":
-        return log.fixes
+        return None if role == "heading" else log.fixes
     series = _depths(log)
     if not series:
         return None

@@ -31,7 +31,7 @@ _FORM: Final = 1
 _KINDS: Final = "biuf"  # of arrays
 _PLAIN: Final = (bool, int, float, str, type(None))
 _OURS: Final = "surefix."
-_SEVERAL: Final = (list, set, deque)
+_SEVERAL: Final = (list, set)
 
 T = TypeVar("T")
 
@@ -103,6 +103,8 @@ def _packed(value: object, arrays: list[NDArray[Any]]) -> Any:
         return {"bytes": value.decode("latin-1")}
     if isinstance(value, array):
         return {"numbers": value.typecode, "of": _packed(np.array(value), arrays)}
+    if isinstance(value, deque):
+        return {"deque": [_packed(item, arrays) for item in value], "most": value.maxlen}
     if isinstance(value, _SEVERAL):
         return {type(value).__name__: [_packed(item, arrays) for item in value]}
     if isinstance(value, Session) and value.estimator is not None:
@@ -129,6 +131,8 @@ def _unpacked(tree: Any, arrays: list[NDArray[Any]]) -> Any:
         return tree["bytes"].encode("latin-1")
     if "numbers" in tree:
         return array(tree["numbers"], _unpacked(tree["of"], arrays).tolist())
+    if "deque" in tree:
+        return deque((_unpacked(item, arrays) for item in tree["deque"]), tree["most"])
     for several in _SEVERAL:
         if several.__name__ in tree:
             return several(_unpacked(item, arrays) for item in tree[several.__name__])

@@ -6,23 +6,27 @@
 ``tcp-listen://127.0.0.1:10110``          a server that others connect to
 ``serial:///dev/ttyUSB0?baud=4800``       a serial line
 ``file:///logs/dive.nmea?speed=100``      a recorded log, replayed; ``speed=0``: as fast as can be
+``file:track.csv``                        an output: the clean track, recorded
 ========================================  ======================================================
 """
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Final, NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
 from surefix.errors import OptionsError
 
-__all__ = ["INPUTS", "OUTPUTS", "Address", "address"]
+__all__ = ["INPUTS", "OUTPUTS", "RECORDED", "Address", "address"]
 
 INPUTS: Final = ("udp", "tcp", "tcp-listen", "serial", "file")
 """What can be read from."""
-OUTPUTS: Final = ("udp", "tcp-listen", "serial")
+OUTPUTS: Final = ("udp", "tcp-listen", "serial", "file")
 """What can be written to."""
+RECORDED: Final = (".csv", ".parquet")
+"""Kinds of files that a track is recorded in."""
 
 _NETWORK: Final = ("udp", "tcp", "tcp-listen")
 _FIGURES: Final = {"serial": {"baud": 4800.0}, "file": {"speed": 1.0}}
@@ -40,7 +44,7 @@ class Address(NamedTuple):
     path
         Of a device or a file.
     figure
-        Baud, or how many times faster a log is replayed.
+        Baud, or how many times faster a log is replayed; NaN for a file that is written.
     """
 
     kind: str
@@ -54,6 +58,8 @@ class Address(NamedTuple):
         if self.kind in _NETWORK:
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"{self.kind}://{host}:{self.port}"
+        if math.isnan(self.figure):
+            return f"{self.kind}://{self.path}"
         (name,) = _FIGURES[self.kind]
         return f"{self.kind}://{self.path}?{name}={self.figure:g}"
 
@@ -84,6 +90,10 @@ def address(text: str, known: tuple[str, ...]) -> Address:
         return Address(kind, parts.hostname, port)
     ((name, usual),) = _FIGURES[kind].items()
     wrong = OptionsError(shown, f"{kind}:///PATH?{name}={usual:g}")
+    if known is OUTPUTS and kind == "file":
+        if parts.netloc or parts.query or Path(parts.path).suffix not in RECORDED:
+            raise OptionsError(shown, "file:PATH that ends in " + " or ".join(RECORDED))
+        return Address(kind, path=parts.path, figure=math.nan)
     query = parse_qs(parts.query, keep_blank_values=True)
     if parts.netloc or not parts.path or set(query) - {name}:
         raise wrong

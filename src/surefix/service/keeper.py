@@ -66,6 +66,11 @@ class Keeper:
         self.gap = Gap()
         """What it will never get, since this was last read and reset."""
 
+    @property
+    def waiting(self) -> list[Received | Told]:
+        """What the journal has not got yet, the oldest first."""
+        return [*self._flying, *self._waiting]
+
     async def keep(
         self,
         records: Iterable[Received | Told] = (),

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
@@ -29,6 +30,7 @@ from surefix.service.judgement import judge_sensors
 from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.recorder import Recorder
 from surefix.service.sensors import SensorState
 from surefix.service.station import (
     Ahead,
@@ -60,7 +62,7 @@ class Live:
         Where it is written, and what has not got there yet.
     station, now
         What is known, and where the vehicle is; None as long as nothing is settled.
-    lines, outputs
+    lines, outputs, recorders
         The inputs and the outputs, as they are.
     taken, said
         Numbers of the last bytes received, and of the last thing put out.
@@ -84,6 +86,7 @@ class Live:
     station: Station
     lines: list[Line]
     outputs: list[tuple[OutputOptions, Output]] = field(default_factory=list)
+    recorders: list[Recorder] = field(default_factory=list)
     now: Latest | None = None
     taken: int = 0
     said: int = 0
@@ -99,6 +102,11 @@ class Live:
     history: History = field(default_factory=lambda: History(0))
     watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
 
+    @property
+    def unsaved(self) -> list[Received | Told]:
+        """What the journal has not got yet, the oldest first."""
+        return [*self.keeper.waiting, *self.unwritten]
+
 
 def begin_live(options: LiveOptions) -> Live:
     """Open the journal, and stand where the service stood when it was last written.
@@ -109,7 +117,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.role) for each in options.inputs])
+    journal.begin([(each.name, each.task) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -117,29 +125,27 @@ def begin_live(options: LiveOptions) -> Live:
             break
         except InputError:
             continue  # damaged: the one before it, and more of the journal, do as well
+    files = [each.address.path for each in options.outputs if each.address.kind == "file"]
+    recorders = [Recorder(Path(path), station.rows) for path in files]
     for piece in journal.received(station.after):
-        station, _ = receive(station, [piece])
+        station, batches = receive(station, [piece])
+        for recorder in recorders:
+            recorder.add(batches)
+    for recorder in recorders:
+        recorder.ready()
     taken, said = journal.last()
     lines = [Line(each.address) for each in options.inputs]
     for source, size in _replayed(options, journal).items():
         lines[source].size = size
     known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
-    keeper, history = Keeper(journal), _remembered(options, journal, station)
-    return Live(
-        options, journal, keeper, station, lines,
-        taken=taken, said=said, alarms=known, history=history,
-    )  # fmt: skip
-
-
-def _remembered(options: LiveOptions, journal: Journal, station: Station) -> History:
-    """The last rows that the journal has; none if they cannot be read: they are only looked at."""
-    most = 0 if options.web is None else options.web.history_rows
-    history = History(most)
-    if most:
-        history.sensors = station.session.sensors
-        with contextlib.suppress(InputError):
-            history.extend(unpacked(journal.newest("rows", most)))
-    return history
+    live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
+    live.recorders, live.alarms = recorders, known
+    if options.web is not None:
+        live.history = History(options.web.history_rows)
+        live.history.sensors = station.session.sensors
+        with contextlib.suppress(InputError):  # it is only looked at
+            live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
+    return live
 
 
 def _replayed(options: LiveOptions, journal: Journal) -> dict[int, int]:
@@ -160,22 +166,24 @@ async def run_live(
     InputError, OutputError
         A port is taken, or a log is not there.
     """
-    inbox, steady = Inbox(), SteadyClock()
-    clock, web = clock or steady, None
+    inbox, steady, web = Inbox(), SteadyClock(), None
+    clock = clock or steady
     try:
         if live.options.web is not None:
             from surefix.service.web_server import open_web
 
             web = open_web(live, live.options.web, clock)
-            live.watchers.append(web.notice)
         for wanted in live.options.outputs:
-            live.outputs.append((wanted, await open_output(wanted.address)))
+            if wanted.address.kind != "file":
+                live.outputs.append((wanted, await open_output(wanted.address)))
+        _gaps(live)
         async with asyncio.TaskGroup() as tasks:
             reading = [
                 tasks.create_task(listen(i, live.lines[i], inbox, allow=each.allow, clock=clock))
                 for i, each in enumerate(live.options.inputs)
             ]
             if web is not None:
+                live.watchers.append(web.notice)
                 tasks.create_task(web.run())
             while not stop.is_set() and not live.station.session.merging.ended:
                 arrived = await _next(inbox, stop)
@@ -193,6 +201,8 @@ async def run_live(
         for _, output in live.outputs:
             await output.close()
         live.journal.close()
+        for recorder in live.recorders:
+            recorder.close()
 
 
 async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
@@ -202,6 +212,8 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         live.taken += 1
         received.append(Received(live.taken, *each))
     live.station, batches = receive(live.station, received)
+    for recorder in live.recorders:
+        recorder.add(batches)
     told = [_told(live, *what) for what in _events(batches)]
     if live.options.web is not None and len(rows := live.history.add(batches)):
         told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
@@ -270,6 +282,14 @@ def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
     live.alarms = after
 
 
+def _gaps(live: Live) -> None:
+    """Say of each recorded track which rows it will never have."""
+    for each in live.recorders:
+        if each.missing:
+            text = f"note: {each.place} lacks {each.missing} rows before these"
+            live.unwritten.append(_told(live, math.nan, "event", text))
+
+
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
     """Where the vehicle is, if that is news: at the newest fix, or by dead reckoning at a tick.
 
@@ -309,7 +329,7 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
 
 def _epoch(known: Latest) -> Epoch:
     if known.geodetic is None:
-        return Epoch(known.time, known=False)
+        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
     latitude, longitude, height = known.geodetic
     east, north, _ = known.velocity
     sigma_east, sigma_north, sigma_up = known.sigma_position
@@ -323,6 +343,8 @@ def _epoch(known: Latest) -> Epoch:
         sigma_east=float(sigma_east),
         sigma_north=float(sigma_north),
         sigma_up=float(sigma_up),
+        heading=known.heading,
+        depth=known.depth,
         known=not known.dead_reckoned,
     )
 
@@ -357,6 +379,8 @@ async def _write(live: Live, now: float, *, whole: bool = False) -> None:
 
         def snapshot() -> tuple[int, bytes]:
             live.stored_at = time.monotonic()
+            for recorder in live.recorders:  # a snapshot knows of no row that is not recorded
+                recorder.flush()
             return live.station.after, stored(live.station)
 
     if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:

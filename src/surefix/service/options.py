@@ -16,15 +16,18 @@
     sentences = ["GGA", "RMC", "VTG", "GST"]
     talker = "GP"
 
+    [[output]]
+    to = "file:track.csv"             # the clean track, recorded; or .parquet
+
     [journal]
     url = "sqlite:///mission.db"
-
-    [web]                             # see surefix.service.web_options
-    address = "127.0.0.1:8000"
 
     [alarms]
     position_sigma_m = 10.0           # σ above which the position is called uncertain
     dead_reckoning_s = 10.0           # time without a fix after which it is called lost
+
+    [web]                             # see surefix.service.web_options
+    address = "127.0.0.1:8000"
 """
 
 from __future__ import annotations
@@ -68,6 +71,9 @@ class InputOptions:
         Networks that datagrams and clients may come from; empty: any.
     require_checksum
         False accepts sentences without one.
+    target
+        Of an acoustic positioning system: the transponder whose sightings are the fixes, or
+        ``first``, the one that is heard first; None, or ``ship``: the fixes are the receivers'.
     """
 
     name: str
@@ -75,6 +81,7 @@ class InputOptions:
     role: str = "fixes"
     allow: tuple[str, ...] = ()
     require_checksum: bool = True
+    target: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -88,6 +95,15 @@ class InputOptions:
                 raise OptionsError(f"allow {network!r} of {self.name}", "a network") from error
         if not isinstance(self.require_checksum, bool):
             raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
+        if self.target is not None and (not isinstance(self.target, str) or not self.target):
+            raise OptionsError(f"target {self.target!r}", "the name of a transponder, or first")
+        if self.target is not None and self.role != "fixes":
+            raise OptionsError(f"target of {self.name}, a source of {self.role}", "role fixes")
+
+    @property
+    def task(self) -> str:
+        """Its role and target, as the journal has them."""
+        return self.role if self.target is None else f"{self.role} of {self.target}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,13 +115,13 @@ class OutputOptions:
     address
         Where it goes to.
     sentences
-        Some of ``SENTENCES``.
+        Some of ``SENTENCES``; HDT and DPT go out where a heading, a depth is known.
     talker
         Two letters that the sentences begin with.
     """
 
     address: Address
-    sentences: tuple[str, ...] = ("GGA", "RMC", "VTG", "GST")
+    sentences: tuple[str, ...] = TYPES
     talker: str = "GP"
 
     def __post_init__(self) -> None:
@@ -154,10 +170,10 @@ class LiveOptions:
         URL of the journal.
     snapshot_s
         Time between two snapshots, s.
-    web
-        Dashboard and API; None: none.
     alarms
         When alarms are raised.
+    web
+        Dashboard and API; None: none.
     """
 
     clean: CleanOptions
@@ -165,8 +181,8 @@ class LiveOptions:
     outputs: tuple[OutputOptions, ...] = ()
     journal: str = "sqlite:///surefix.db"
     snapshot_s: float = 10.0
-    web: WebOptions | None = None
     alarms: AlarmOptions = AlarmOptions()
+    web: WebOptions | None = None
 
     def __post_init__(self) -> None:
         if not any(each.role == "fixes" for each in self.inputs):
@@ -207,8 +223,8 @@ def read_live(path: str | Path) -> LiveOptions:
         clean=options_from(given),
         inputs=tuple(_input(place, each) for each in _list(place, content, "input")),
         outputs=tuple(_output(place, each) for each in _list(place, content, "output")),
-        web=_web(place, content),
         alarms=AlarmOptions(**alarms),
+        web=_web(place, content),
         **{("journal" if key == "url" else key): value for key, value in journal.items()},
     )
 
@@ -249,7 +265,9 @@ def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any
 
 
 def _input(place: Path, table: dict[str, Any]) -> InputOptions:
-    rest = _known(place, "input", table, {"name", "from", "role", "allow", "require_checksum"})
+    rest = _known(
+        place, "input", table, {"name", "from", "role", "allow", "require_checksum", "target"}
+    )
     if "name" not in rest or "from" not in rest:
         raise OptionsError(f"{place}: an input without name or from", "both")
     where = address(str(rest.pop("from")), INPUTS)
@@ -262,7 +280,12 @@ def _output(place: Path, table: dict[str, Any]) -> OutputOptions:
     rest = _known(place, "output", table, {"to", "sentences", "talker"})
     if "to" not in rest:
         raise OptionsError(f"{place}: an output without to", "an address")
-    return OutputOptions(address=address(str(rest.pop("to")), OUTPUTS), **rest)
+    where = address(str(rest.pop("to")), OUTPUTS)
+    if where.kind == "file":
+        if rest:
+            raise OptionsError(f"{place}: {min(rest)!r} of a recorded track", "only to")
+        where = where._replace(path=str(place.parent / where.path))
+    return OutputOptions(address=where, **rest)
 
 
 def _known(place: Path, name: str, table: dict[str, Any], keys: set[str]) -> dict[str, Any]:

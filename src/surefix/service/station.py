@@ -7,7 +7,6 @@ ones to be put before them. Both go through the very steps of `surefix clean`.
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,9 +20,11 @@ from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
+from surefix.service.delays import with_delays
 from surefix.service.heard import Heard, hear
 from surefix.service.options import LiveOptions
-from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
+from surefix.service.series import FRESH, series_at, with_few_series
+from surefix.types import Channel, Cleaned, Fixes, FloatArray, Log, Verdict
 
 __all__ = [
     "Ahead",
@@ -53,6 +54,11 @@ class Latest(NamedTuple):
         (3,) latitude and longitude, deg, and height, m; None for a metric log.
     observed
         s, Unix, of the last fix that was used at least in part.
+    heading
+        deg, true; NaN if it is not known.
+    depth
+        m, positive down: of the vehicle where it has a depth sensor, else of the water; NaN if it
+        is not known.
     """
 
     time: float
@@ -62,6 +68,8 @@ class Latest(NamedTuple):
     sigma_velocity: FloatArray
     geodetic: FloatArray | None
     observed: float
+    heading: float = math.nan
+    depth: float = math.nan
 
     @property
     def dead_reckoned(self) -> bool:
@@ -100,6 +108,11 @@ class Station:
         Where the vehicle was at the last row that is cleaned for good; None before.
     heard
         When something came of each sensor.
+    rows
+        How many rows are cleaned for good.
+    delays
+        By sensor: when observations of the last minute were received, and how long after they were
+        valid, s.
     """
 
     session: Session
@@ -107,12 +120,16 @@ class Station:
     after: int = 0
     shown: Latest | None = None
     heard: tuple[Heard, ...] = ()
+    rows: int = 0
+    delays: tuple[Channel, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
     """Begin with nothing received."""
     inputs = [(each.name, each.role) for each in options.inputs]
-    streams = tuple(NmeaStream(Path(each.name), each.require_checksum) for each in options.inputs)
+    streams = tuple(
+        NmeaStream(Path(each.name), each.require_checksum, each.target) for each in options.inputs
+    )
     return Station(begin_session(inputs, options.clean, live=True), streams)
 
 
@@ -124,13 +141,15 @@ class _Stored(NamedTuple):
     after: int
     shown: Latest | None
     heard: tuple[Heard, ...]
+    rows: int
+    delays: tuple[Channel, ...]
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    kept = _Stored(station.session, states, station.after, station.shown, station.heard)
-    return snapshot(kept)
+    rest = station.after, station.shown, station.heard, station.rows, station.delays
+    return snapshot(_Stored(station.session, states, *rest))
 
 
 def resumed(options: LiveOptions, content: bytes) -> Station:
@@ -145,7 +164,7 @@ def resumed(options: LiveOptions, content: bytes) -> Station:
     streams = begin_station(options).streams
     for stream, state in zip(streams, known.streams, strict=True):
         stream.resume(state)
-    return Station(known.session, streams, known.after, known.shown, known.heard)
+    return Station(known.session, streams, *known[2:])
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
@@ -159,22 +178,24 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     session, streams, heard = station.session, [*station.streams], station.heard
     batches: list[Cleaned] = []
     fresh: set[int] = set()
+    delays = station.delays
     for piece in received:
         if session.merging.inflows[piece.source].ended:
             continue
         if piece.source not in fresh:
-            streams[piece.source] = copy.deepcopy(streams[piece.source])
+            streams[piece.source] = streams[piece.source].copy()
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
         heard = hear(heard, piece.source, log, stream.begun, piece.time)
+        delays = with_delays(delays, log.delays)
         session, done = advance(session, piece.source, log)
         batches += done
         behind = max((each.latest for each in heard), default=-math.inf) - session.options.reorder_s
         for i, other in enumerate(streams):
             begun = other.begun
             if i != piece.source and begun and begun[0][2] < behind:
-                streams[i] = copy.deepcopy(other)
+                streams[i] = other.copy()
                 session, done = advance(session, i, streams[i].settle(behind))
                 batches += done
         if not piece.data:
@@ -182,7 +203,8 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             batches += done
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
-    return Station(session, tuple(streams), after, shown, heard), tuple(batches)
+    rows = station.rows + sum(len(batch.track.time) for batch in batches)
+    return Station(session, tuple(streams), after, shown, heard, rows, delays), tuple(batches)
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
@@ -203,12 +225,30 @@ def look_ahead(station: Station, time: float = math.nan) -> Ahead:
     """Tell what all that was received says; arguments as for `latest`."""
     if station.session.setup is None:
         return Ahead(station.session, None)
-    logs = [copy.deepcopy(stream).rest() for stream in station.streams]
+    logs = [stream.copy().rest() for stream in station.streams]
     roles = [inflow.role for inflow in station.session.merging.inflows]
     first = roles.index("fixes")
     logs[first] = _with(logs[first], time)
-    session, batches = end_on_trial(station.session, logs)
-    return Ahead(session, _last(batches, station.shown))
+    session, batches = end_on_trial(with_few_series(station.session), logs)
+    known = _last(batches, station.shown)
+    if known is None:
+        return Ahead(session, None)
+    told = series_at(known.time, batches, station.session.names, roles)
+    depth = told["depth_m"]
+    if _dives(station, known.time):
+        depth = -float(known.position[2] if known.geodetic is None else known.geodetic[2])
+    return Ahead(session, known._replace(heading=told["heading_deg"], depth=depth))
+
+
+def _dives(station: Station, time: float) -> bool:
+    """Whether the height of the track is that of a depth sensor which is still heard."""
+    inflows = station.session.merging.inflows
+    heard = [
+        stream.newest
+        for stream, inflow in zip(station.streams, inflows, strict=True)
+        if inflow.role == "depth" or (station.session.has_depth and inflow.role == "fixes")
+    ]
+    return any(time - newest <= FRESH for newest in heard)
 
 
 def _with(log: Log, time: float) -> Log:

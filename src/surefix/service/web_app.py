@@ -152,9 +152,7 @@ def web_app(
 async def _written(live: Live, number: int) -> bool:
     """Wait until the journal has what was told up to a number; False if that takes too long."""
     end = time.monotonic() + _WRITTEN
-    while live.keeper.size or any(
-        isinstance(each, Told) and each.number <= number for each in live.unwritten
-    ):
+    while any(isinstance(each, Told) and each.number <= number for each in live.unsaved):
         if time.monotonic() > end:
             return False
         await asyncio.sleep(0.02)

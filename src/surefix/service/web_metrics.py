@@ -13,6 +13,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.exposition import generate_latest
 from prometheus_client.registry import Collector
 
+from surefix.io.journal import Received
 from surefix.service.inbox import Arrived
 from surefix.service.web_guard import WebState
 from surefix.types import Verdict
@@ -52,13 +53,10 @@ class Metrics(Collector):
         self._next = live.history.total
         self.stepped = clock()
         """s, Unix, when the service made its last step."""
-        self._written = self.stepped
 
     def notice(self, arrived: Sequence[Arrived]) -> None:
         """Count a step and what it took in."""
         self.stepped = self._clock()
-        if not self._live.keeper.size:
-            self._written = self.stepped
         for each in arrived:
             if math.isfinite(each.time):
                 self._latency.observe(max(0.0, self.stepped - each.time))
@@ -119,12 +117,14 @@ class Metrics(Collector):
         yield _gauge("alarms", "To be seen", ["priority"], levels)
 
     def _journal(self, now: float) -> Iterator[Metric]:
-        keeper = self._live.keeper
-        lag = now - self._written if keeper.size else 0.0
-        yield _gauge("journal_waiting_bytes", "To be written", [], [([], keeper.size)])
-        yield _gauge("journal_lag_seconds", "Since all was written", [], [([], max(0.0, lag))])
-        yield _gauge("journal_trouble", "1 if it is away", [], [([], float(bool(keeper.trouble)))])
-        yield _gauge("journal_gap_bytes", "Of the present gap", [], [([], keeper.gap.size)])
+        waiting = self._live.unsaved
+        oldest = next((each.time for each in waiting if isinstance(each, Received)), math.nan)
+        lag = max(0.0, now - oldest) if math.isfinite(oldest) else 0.0
+        yield _gauge("journal_unwritten", "Things to be written", [], [([], len(waiting))])
+        yield _gauge("journal_lag_seconds", "Age of the oldest of them", [], [([], lag)])
+        yield _gauge(
+            "journal_missing_bytes", "Of the present gap", [], [([], self._live.keeper.gap.size)]
+        )
 
 
 def _counter(name: str, text: str, labels: Sequence[str], samples: _Samples) -> Metric:

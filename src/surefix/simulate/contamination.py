@@ -15,18 +15,27 @@ from typing import Final, Literal
 import numpy as np
 
 from surefix.errors import OptionsError
+from surefix.simulate.drags import Drag, pull_of
 from surefix.simulate.vehicles import Vehicle, drive
 from surefix.types import AXES, BoolArray, FloatArray
 
-__all__ = ["SCENARIOS", "Scenario", "Trial", "World", "alone", "columns", "draw", "draw_world"]
+__all__ = [
+    "SCENARIOS",
+    "Scenario",
+    "Trial",
+    "World",
+    "alone",
+    "columns",
+    "columns_beside",
+    "draw",
+    "draw_world",
+]
 
 _GROSS = (10.0, 130.0)  # σ: 3 … 40 m where σ is 0.3 m
 _GOOD_BEFORE = 5  # fixes at the beginning without errors, unless the first is to be bad
 _BURST = 30  # fixes of the longest run of errors
 _GAP = (10.0, 60.0)  # intervals a dropout lasts
 _VELOCITY_RUN = (5, 40)  # epochs a run of wrong velocities lasts
-_DRAG = 60  # fixes over which a drag grows, and as many over which it goes back …
-_PULL = 1.0  # … by so many σ from one fix to the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +106,11 @@ class Scenario:
         Whether 30 fixes on end err too: with one ``common`` offset, or each ``independent`` of the
         others.
     drag
-        Whether the fixes drift away for 60 intervals, by 1 σ from each to the next, and back as
-        slowly: an error without any step.
+        How the fixes wander off: an error that begins without any step. ``vertical`` is along the
+        last axis alone.
+    beside
+        Another sensor with the same noise and rate and without faults: a ``source`` of fixes, or a
+        ``depth`` of the last axis alone.
     first_bad
         The very first fix is a gross error.
     jump
@@ -123,7 +135,8 @@ class Scenario:
     size: tuple[float, float] = _GROSS
     one_axis: bool = False
     run: Literal["common", "independent"] | None = None
-    drag: bool = False
+    drag: Drag | None = None
+    beside: Literal["source", "depth"] | None = None
     first_bad: bool = False
     jump: float = 0.0
     misjudged: float = 1.0
@@ -144,7 +157,10 @@ SCENARIOS: Final[Mapping[str, Scenario]] = MappingProxyType(
         "isolated-40": Scenario(share=0.4),
         "burst-common": Scenario(share=_BESIDE_BURST, run="common"),
         "burst-independent": Scenario(share=_BESIDE_BURST, run="independent"),
-        "drag": Scenario(drag=True),
+        "drag": Scenario(drag="even"),
+        "drag-slow": Scenario(drag="slow"),
+        "drag-source": Scenario(drag="slow", beside="source"),
+        "drag-depth": Scenario(drag="vertical", beside="depth"),
         "jump": Scenario(jump=67.0),
         "small": Scenario(share=0.2, size=(3.3, 10.0)),
         "one-axis": Scenario(share=0.2, one_axis=True),
@@ -176,6 +192,8 @@ class Trial:
         (n, d) truth, m and m/s; a jump is part of the position.
     fixes, velocities
         (n, d) as measured; NaN where missing.
+    beside
+        (n, d) positions of the sensor beside; NaN where there is none, or not on the axis.
     error
         (n, d) gross errors of the fixes, m, noise not included; zero where there is none.
     bad_velocity
@@ -191,6 +209,7 @@ class Trial:
     velocity: FloatArray
     fixes: FloatArray
     velocities: FloatArray
+    beside: FloatArray
     error: FloatArray
     bad_velocity: BoolArray
     jump: int
@@ -250,7 +269,8 @@ def draw(scenario: str, world: World, seed: int | Sequence[int]) -> Trial:
     if scenario not in SCENARIOS:
         raise OptionsError(f"scenario {scenario!r}", "one of " + ", ".join(SCENARIOS))
     plan = SCENARIOS[scenario]
-    clock, motion, noise, dvl, where, sizes, leap, wrong = np.random.default_rng(seed).spawn(8)
+    streams = np.random.default_rng(seed).spawn(9)
+    clock, motion, noise, dvl, where, sizes, leap, wrong, other = streams
     n, d, sigma = world.epochs, world.axes, world.sigma_m
     time, with_fix, with_row = _times(clock, plan, world)
     path = drive(plan.vehicle, motion, time / world.interval_s, d, world.agility)
@@ -259,6 +279,8 @@ def draw(scenario: str, world: World, seed: int | Sequence[int]) -> Trial:
     if plan.jump:
         position[jump:] += plan.jump * sigma * _directions(leap, 1, d)
     error = sigma * _errors(where, sizes, plan, n, d, jump)
+    beside = position + sigma * other.standard_normal((n, d))
+    beside[:, : 0 if plan.beside == "source" else d - 1 if plan.beside == "depth" else d] = np.nan
     scatter = _scatter(noise, plan.freedom, (n, d))
     slips = _velocity_errors(wrong, plan.velocity_runs, n, d)
     fixes = position + sigma * scatter + error
@@ -272,6 +294,7 @@ def draw(scenario: str, world: World, seed: int | Sequence[int]) -> Trial:
         velocity=velocity,
         fixes=fixes,
         velocities=velocity + world.sigma_mps * (dvl.standard_normal((n, d)) + slips),
+        beside=beside,
         error=error,
         bad_velocity=slips != 0.0,
         jump=jump,
@@ -296,6 +319,18 @@ def columns(trial: Trial) -> dict[str, FloatArray]:
     return table
 
 
+def columns_beside(trial: Trial) -> dict[str, FloatArray | TextArray] | None:
+    """Columns of the log of the sensor beside the fixes; None where there is none."""
+    match trial.scenario.beside:
+        case "source":
+            named = np.full(len(trial.time), "beside")
+            own = dict(zip(AXES, trial.beside.T, strict=False))
+            return {"time": trial.time, "sensor": named, **own}
+        case "depth":
+            return {"time": trial.time, "depth": -trial.beside[:, -1]}
+    return None
+
+
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
     """Draw a number whose logarithm is uniform."""
     return float(low * (high / low) ** rng.uniform())
@@ -303,7 +338,8 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
 
 def _rows(trial: Trial, kept: BoolArray) -> Trial:
     """Keep some rows; the jump is where the first kept row after it is."""
-    names = ("time", "position", "velocity", "fixes", "velocities", "error", "bad_velocity")
+    names = ("time", "position", "velocity", "fixes", "velocities", "beside", "error")
+    names += ("bad_velocity",)
     jump = int(kept[: trial.jump].sum()) if trial.jump >= 0 else -1
     return replace(trial, jump=jump, **{name: getattr(trial, name)[kept] for name in names})
 
@@ -335,7 +371,8 @@ def _errors(
 ) -> FloatArray:
     """(n, d) gross errors in σ."""
     error = np.zeros((n, d))
-    length = _BURST if plan.run else 2 * _DRAG - 1 if plan.drag else 0
+    pull = pull_of(sizes, plan.drag)
+    length = _BURST if plan.run else len(pull)
     first = int(where.integers(_GOOD_BEFORE + 20, n - length)) if length else n
     stretch = np.arange(first, first + length)
     others = np.setdiff1d(np.arange(_GOOD_BEFORE, n), [*stretch, jump])
@@ -347,9 +384,10 @@ def _errors(
         error[stretch] = _lengths(sizes, plan, 1) * _directions(sizes, 1, d)
     elif plan.run == "independent":
         error[stretch] = _lengths(sizes, plan, len(stretch)) * _directions(sizes, len(stretch), d)
+    elif plan.drag == "vertical":
+        error[stretch, -1] = pull
     elif plan.drag:
-        off = _PULL * (_DRAG - np.abs(np.arange(1 - _DRAG, _DRAG)))
-        error[stretch] = off[:, None] * _directions(sizes, 1, d)
+        error[stretch] = pull[:, None] * _directions(sizes, 1, d)
     return error
 
 

@@ -1,0 +1,1 @@
+"""The review page: its markup, style and scripts."""
