@@ -1,14 +1,16 @@
 """The dashboard in a real browser: it shows what the service knows, and obeys the keyboard."""
 
+import math
 import time
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
 
 from needs import tool
 from service.test_station import recorded
-from service.web_made import OPERATOR, TOKENS, VIEWER, served
-from surefix.service.alarms import raised
+from service.web_made import OPERATOR, TOKENS, VIEWER, served, voyage
+from surefix.service.alarms import active, raised
 from surefix.service.sensors import SensorState
 
 webdriver = pytest.importorskip("selenium.webdriver")
@@ -48,12 +50,15 @@ def browser():
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory):
-    with served(tmp_path_factory.mktemp("dashboard"), "requests_per_s = 1000", rows=300) as made:
+    with served(tmp_path_factory.mktemp("dashboard"), "requests_per_s = 1000", rows=0) as made:
+        made.sail(voyage(310))
         yield made
 
 
+@contextmanager
 def judged(service):
-    """Three sensors, one of each kind, and two alarms."""
+    """Three sensors, one of each kind, and two alarms, for a while."""
+    before = {"sensors": service.live.sensors, "alarms": service.live.alarms}
     now = service.now
     evil = "<b>gyro</b><script>alert(1)</script>"
     sensors = (
@@ -66,7 +71,8 @@ def judged(service):
     alarms = raised((), "gyro", "warning", "stale: nothing for 12 s", now - 12.0)
     alarms = raised(alarms, "position", "alarm", "dead-reckoned: no fix is used", now - 4.0)
     service.call(service.set(sensors=sensors, alarms=alarms))
-    return alarms
+    yield
+    service.call(service.set(**before))
 
 
 class Page:
@@ -114,58 +120,67 @@ class Page:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_everything_is_there_and_fits(browser, service, size):
-    judged(service)
-    page = Page(browser, service, size).drawn()
-    page.until("document.querySelectorAll('#plan .trace').length > 3")
-    seen = SimpleNamespace(**browser.execute_script(STATE))
-    assert seen.wide <= SIZES[size][0]
-    assert seen.right <= SIZES[size][0]
-    assert seen.least >= 44.0  # for a finger
-    assert seen.strips >= 3
-    assert set(seen.fetched) == {service.host}
-    assert page.complaints() == []
+    with judged(service):
+        page = Page(browser, service, size).drawn()
+        page.until("document.querySelectorAll('#plan .trace').length > 3")
+        seen = SimpleNamespace(**browser.execute_script(STATE))
+        assert seen.wide <= SIZES[size][0]
+        assert seen.right <= SIZES[size][0]
+        assert seen.least >= 44.0  # for a finger
+        assert seen.strips >= 3
+        assert set(seen.fetched) == {service.host}
+        assert page.complaints() == []
 
 
 def test_a_sensor_is_judged_in_words_signs_and_colour(browser, service):
-    judged(service)
-    page = Page(browser, service).drawn()
-    page.until("document.querySelectorAll('.card').length === 3")
-    cards = page("[...document.querySelectorAll('.card')].map((c) => c.innerText)")
-    assert "✓" in cards[0]
-    assert "valid" in cards[0]
-    assert "8.0 %" in cards[0]
-    assert "?" in cards[1]
-    assert "doubtful" in cards[1]
-    assert "noisy: 2.1 times" in cards[1]
-    assert "✕" in cards[2]
-    assert "invalid" in cards[2]
-    assert "<script>alert(1)</script>" in cards[2]  # as text
-    colours = page(
-        "[...document.querySelectorAll('.card')].map((c) => getComputedStyle(c).borderLeftColor)"
-    )
-    assert len(set(colours)) == 3
-    assert page("document.querySelectorAll('main script, main .card b b').length") == 0
+    with judged(service):
+        page = Page(browser, service).drawn()
+        page.until("document.querySelectorAll('.card').length === 3")
+        cards = page("[...document.querySelectorAll('.card')].map((c) => c.innerText)")
+        assert "✓" in cards[0]
+        assert "valid" in cards[0]
+        assert "8.0 %" in cards[0]
+        assert "?" in cards[1]
+        assert "doubtful" in cards[1]
+        assert "noisy: 2.1 times" in cards[1]
+        assert "✕" in cards[2]
+        assert "invalid" in cards[2]
+        assert "<script>alert(1)</script>" in cards[2]  # as text
+        edge = "getComputedStyle(card).borderLeftColor"
+        colours = page(f"[...document.querySelectorAll('.card')].map((card) => {edge})")
+        assert len(set(colours)) == 3
+        assert page("document.querySelectorAll('main script, main .card b b').length") == 0
 
 
 def test_an_alarm_is_acknowledged_by_the_keyboard(browser, service):
-    alarms = judged(service)
+    """What is wrong at sea is told; one alarm lasts and one is over when they are seen."""
+    service.silence(1)
+    shown = active(service.live.alarms)
+    (lasts,) = [each for each in shown if each.text.startswith("stale") and math.isnan(each.gone)]
+    over = shown[0]
+    assert (over.priority, over.concerns) == ("alarm", "position")
+    assert not math.isnan(over.gone)
     page = Page(browser, service).drawn()
-    page.until("document.querySelectorAll('.alarm').length === 2")
-    assert page("document.title").startswith("(2)")
-    assert "position: dead-reckoned" in page.text(".alarm")  # the most urgent comes first
-    page.focus_by_tab(".alarm[data-priority=alarm] button")
-    ring = page("getComputedStyle(document.activeElement).outlineStyle")
-    assert ring == "solid"
+    page.until(f"document.querySelectorAll('.alarm').length === {len(shown)}")
+    assert page("document.title").startswith(f"({len(shown)})")
+    assert "position: lost: dead reckoning" in page.text(".alarm")  # the most urgent comes first
+    place = f".alarm[data-key='{lasts.number}']"
+    page.focus_by_tab(f"{place} button")
+    assert page("getComputedStyle(document.activeElement).outlineStyle") == "solid"
     time.sleep(2.2)  # records go on coming: the focus stays
-    page.until("document.activeElement.matches('.alarm[data-priority=alarm] button')", 0.1)
+    page.until(f"document.activeElement.matches({place + ' button'!r})", 0.1)
     page.press(keys.ENTER)
-    service.feed(b"\r\n")
-    page.until("document.querySelector('.alarm[data-priority=alarm]').dataset.seen === 'true'")
-    (seen,) = [each for each in service.live.alarms if each.number == alarms[1].number]
-    assert seen.by == "operator at 127.0.0.1"
-    assert page("document.title").startswith("(1)")
-    assert "acknowledged" in page.text(".alarm[data-priority=alarm]")
-    assert page("document.activeElement.id") == "alarms"
+    service.silence(1)
+    page.until(f"document.querySelector({place!r}).dataset.seen === 'true'")
+    assert "acknowledged" in page.text(place)
+    page.until("document.activeElement.matches('.alarm button')")  # the next to be seen
+    page.focus_by_tab(f".alarm[data-key='{over.number}'] button")
+    page.press(keys.SPACE)
+    service.silence(1)
+    page.until(f"!document.querySelector('.alarm[data-key=\\'{over.number}\\']')")
+    assert page("document.title").startswith(f"({len(shown) - 2})")
+    seen = {each.number: each.by for each in service.live.alarms}
+    assert seen[lasts.number] == seen[over.number] == "operator at 127.0.0.1"
 
 
 def test_looking_back_and_coming_back(browser, service):
@@ -174,7 +189,7 @@ def test_looking_back_and_coming_back(browser, service):
     assert total > 250
     page.focus_by_tab("#travel")
     assert page("document.querySelector('#travel').getAttribute('aria-valuetext')") == "live"
-    for _ in range(10):
+    for _ in range(5):
         page.press(keys.PAGE_DOWN)
     page.until("document.querySelector('#status').dataset.kind === 'past'")
     page.until(f"Number(document.documentElement.dataset.drawn) < {total - 100}")
@@ -184,7 +199,7 @@ def test_looking_back_and_coming_back(browser, service):
     last = page("document.querySelector('#position dd').textContent")
     assert last == f"{time.strftime('%Y-%m-%d %H:%M:%S', time.gmtime(rows['time'][-1]))} UTC"
     assert "Looking back" in page.text("#status")
-    service.feed(recorded(310)[len(recorded(300)) :])  # what comes meanwhile changes nothing here
+    service.sail(list(voyage(320))[310:])  # what comes meanwhile changes nothing here
     time.sleep(1.5)
     assert page("Number(document.documentElement.dataset.drawn)") == len(rows)
     page.focus_by_tab("#live")
@@ -200,12 +215,13 @@ def test_new_fixes_are_drawn_as_they_come(tmp_path, browser):
         before = page("Number(document.documentElement.dataset.drawn)")
         where = page.text("#position")
         service.feed(recorded(160)[len(recorded(100)) :])
-        page.until(f"Number(document.documentElement.dataset.drawn) >= {before} + 40")
+        rows = service.live.history.take(service.live.history.since(0))
+        assert len(rows) > before + 40
+        page.until(f"Number(document.documentElement.dataset.drawn) === {len(rows)}")
         assert page.text("#position") != where
         rejected = (
             "document.querySelector('#plan').data.find((t) => t.name === 'rejected').x.length"
         )
-        rows = service.live.history.take(service.live.history.since(0))
         assert page(rejected) == int((rows["verdict"] == 2).sum()) > 0
 
 
@@ -224,8 +240,7 @@ async def cut_all(service):
 
 
 def test_viewers_see_and_operators_act(tmp_path, browser):
-    with served(tmp_path, TOKENS, rows=60) as service:
-        judged(service)
+    with served(tmp_path, TOKENS, rows=60) as service, judged(service):
         page = Page(browser, service).until("document.querySelector('#dialog').open")
         assert page("document.querySelectorAll('.card').length") == 0
         page.press("wrong-token-0123456789", keys.ENTER)

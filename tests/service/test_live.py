@@ -1,6 +1,7 @@
 """The whole service: what comes in at one end comes out clean at the other, and stays known."""
 
 import asyncio
+import contextlib
 import math
 import os
 import re
@@ -16,7 +17,7 @@ import pytest
 
 from service.test_station import CLEAN, recorded, table
 from service.test_transport import free_port, wait_for
-from surefix.errors import OptionsError
+from surefix.errors import InputError, OptionsError
 from surefix.io.journal import open_journal
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
@@ -114,12 +115,18 @@ def test_killed_and_begun_again_it_stands_where_it_stood(tmp_path):
     options = read_live(place)
     lines = recorded(300).splitlines(keepends=True)
     for part in range(3):
-        with subprocess.Popen([SUREFIX, "live", "--options", place]) as run:
+        with (
+            subprocess.Popen([SUREFIX, "live", "--options", place]) as run,
+            contextlib.ExitStack() as ending,
+        ):
+            ending.callback(run.kill)
             end = time.monotonic() + 60.0
-            while not place.with_name("mission.db").exists():
-                time.sleep(0.05)
+            journal = None
+            while journal is None:
                 assert time.monotonic() < end
-            journal = open_journal(options.journal, new=False)
+                with contextlib.suppress(InputError):  # it is not there yet, or just begun
+                    journal = open_journal(options.journal, new=False)
+                time.sleep(0.05)
             before = journal.last()[0]
             while journal.last()[0] == before:
                 _send(port, [b"$HEHDT,218.53,T*12\r\n"], 0.05)

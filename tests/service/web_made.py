@@ -40,6 +40,7 @@ class Served:
     def __init__(self, options):
         self.options, self.now = options, NOON
         self._clients = []
+        self.live = None
         self.loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=[self._run()])
@@ -56,13 +57,14 @@ class Served:
 
     def start(self):
         self._thread.start()
-        self._ready.wait(30.0)
+        assert self._ready.wait(30.0)
+        assert self.live is not None
 
     def stop(self):
         for client in self._clients:
             client.close()
         self.call(self._stop())
-        self._thread.join(30.0)
+        self._thread.join(120.0)
         assert not self._thread.is_alive()
         self.loop.close()
 
@@ -71,7 +73,7 @@ class Served:
 
     def call(self, coroutine):
         """Run something where the service lives."""
-        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(60.0)
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(300.0)  # kernels may be compiled first
 
     async def set(self, **values):
         """Change the service from within."""
@@ -93,6 +95,23 @@ class Served:
                 arrived.append(Arrived(0, self.now, line))
             self.call(step(self.live, arrived, self.now))
 
+    def sail(self, voyage, seconds=4):
+        """Let the sentences of a `voyage` arrive, so many seconds of them at a time."""
+        arrived = []
+        for count, part in enumerate(voyage, 1):
+            self.now += 1.0
+            arrived += [Arrived(0, self.now, line) for line in part.splitlines(keepends=True)]
+            if count % seconds == 0:
+                self.call(step(self.live, arrived, self.now))
+                arrived = []
+        self.call(step(self.live, arrived, self.now))
+
+    def silence(self, seconds):
+        """Let time pass without anything."""
+        for _ in range(seconds):
+            self.now += 1.0
+            self.call(step(self.live, [], self.now))
+
     def client(self, token=None, **headers):
         """A client of the API."""
         shown = {"Authorization": f"Bearer {token}"} if token else {}
@@ -109,7 +128,10 @@ def web_options(folder, more="", address="127.0.0.1:0"):
 
 
 def voyage(seconds, seed=3):
-    """Sentences of a boat that turns, 1 Hz, as they come each second: wild fixes, a run, a gap."""
+    """Sentences of a boat that turns, 1 Hz, as they come each second.
+
+    There are wild fixes, a gap at 100 s, a run of wrong ones at 200 s, no heading from 300 s on.
+    """
     rng = np.random.default_rng(seed)
     k = np.arange(seconds)
     course = np.radians(20.0 + 50.0 * np.sin(k / 60.0))
@@ -128,7 +150,7 @@ def voyage(seconds, seed=3):
         gga = sentence(f"GPGGA,{clock},{where},1,08,1.0,{place[i, 2]:.2f},M,40.0,M,,")
         rmc = sentence(f"GPRMC,{clock},A,{where},{knots:.2f},{degrees:.1f},010826,,,A")
         hdt = sentence(f"HEHDT,{(degrees + rng.normal()) % 360.0:.2f},T")
-        yield (b"" if 100 <= i < 108 else gga + rmc) + hdt
+        yield (b"" if 100 <= i < 108 else gga + rmc) + (hdt if i < 300 else b"")
 
 
 @contextmanager

@@ -145,8 +145,9 @@ def begin_live(options: LiveOptions) -> Live:
     live.recorders, live.alarms = recorders, known
     if options.web is not None:
         live.history = History(options.web.history_rows)
-        live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
         live.history.sensors = station.session.sensors
+        with contextlib.suppress(InputError):  # it is only looked at
+            live.history.extend(unpacked(journal.newest("rows", options.web.history_rows)))
     return live
 
 

@@ -147,7 +147,7 @@ class StateRecord(BaseModel):
     alarms: list[AlarmRecord] = Field(description="those to be shown, the most urgent first")
     inputs: list[LineRecord]
     outputs: list[ExitRecord]
-    unwritten: int = Field(description="things that wait to be written to the journal")
+    unwritten: int = Field(description="bytes that wait for the journal")
     rows: RowsRecord = Field(description="fixes cleaned for good since the record before")
 
 
@@ -188,7 +188,7 @@ def state_record(live: Live, now: float, rows: RowsRecord) -> StateRecord:
             ExitRecord(**vars(output.state) | {"address": str(output.state.address)})
             for _, output in live.outputs
         ],
-        unwritten=len(live.unsaved),
+        unwritten=live.keeper.size,
         rows=rows,
     )
 

@@ -45,7 +45,6 @@ const fill = (item, alarm, role) => {
   button.setAttribute("aria-label", `Acknowledge ${alarm.concerns}: ${alarm.text}`);
   button.title = role === "operator" ? "" : "Only operators may";
   button.disabled = role !== "operator";
-  if (seen && document.activeElement === button) item.parentElement.parentElement.focus();
   button.hidden = seen;
 };
 
@@ -53,8 +52,14 @@ const fill = (item, alarm, role) => {
 export const showAlarms = (alarms, role) => {
   const open = alarms.filter((alarm) => !known(alarm.seen)).length;
   document.getElementById("no-alarms").hidden = alarms.length > 0;
-  document.getElementById("alarms").dataset.open = String(open);
+  const section = document.getElementById("alarms");
+  section.dataset.open = String(open);
   document.title = open ? `(${open}) surefix live` : "surefix live";
   const list = document.getElementById("alarm-list");
+  const focused = list.contains(document.activeElement);
   keyed(list, alarms, (alarm) => alarm.number, begin, (item, alarm) => fill(item, alarm, role));
+  const still = document.activeElement;
+  if (!focused || (list.contains(still) && still.checkVisibility())) return;
+  const next = [...list.querySelectorAll("button:enabled")].find((button) => !button.hidden);
+  (next ?? section).focus();
 };

@@ -11,7 +11,8 @@ const begin = () => {
   const head = make("h3");
   head.append(make("span.name"), make("span.quantity"));
   const judged = make("p.validity");
-  judged.append(make("b.sign", "", { "aria-hidden": "true" }), make("b.word"), make("span.reason"));
+  judged.append(make("b.sign", "", { "aria-hidden": "true" }), make("b.word"));
+  judged.append(make("span.reason"), " ", make("small"));
   card.append(head, judged, make("dl"));
   return card;
 };
@@ -22,8 +23,9 @@ const fill = (card, sensor, now) => {
   say(card.querySelector(".quantity"), sensor.quantity);
   say(card.querySelector(".sign"), SIGNS[sensor.validity] ?? "");
   say(card.querySelector(".word"), sensor.validity);
-  const since = known(sensor.since) && sensor.validity !== "valid" ? `, ${clock(sensor.since)}` : "";
-  say(card.querySelector(".reason"), sensor.reason + (sensor.reason && since));
+  say(card.querySelector(".reason"), sensor.reason);
+  const judged = known(sensor.since) && sensor.validity !== "valid";
+  say(card.querySelector("small"), judged ? `since ${clock(sensor.since)}` : "");
   terms(card.querySelector("dl"), [
     ["Rate", figure(sensor.rate, 2, "Hz")],
     ["Latency", figure(sensor.latency, 2, "s")],
@@ -58,7 +60,7 @@ const outward = (exit) => {
 
 /** Show the inputs, the outputs and the journal of a record. */
 export const showLines = (record) => {
-  const journal = record.unwritten ? `${record.unwritten} things wait to be written` : "written";
+  const journal = record.unwritten ? `${size(record.unwritten)} wait to be written` : "written";
   const lines = [...record.inputs.map(inward), ...record.outputs.map(outward)];
   lines.push(["journal", journal]);
   const blank = () => {
