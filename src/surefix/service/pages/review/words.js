@@ -34,7 +34,9 @@ export const legend = (place, found, marks, hidden, changed) => {
   );
   const focused = place.contains(document.activeElement) && document.activeElement.dataset.name;
   place.replaceChildren();
-  for (const [name, trace] of traces) {
+  const last = ["before", "waits for a run"];
+  const sorted = [...traces].sort((a, b) => last.indexOf(a[0]) - last.indexOf(b[0]));
+  for (const [name, trace] of sorted) {
     const button = document.createElement("button");
     button.type = "button";
     button.dataset.name = name;
