@@ -108,5 +108,6 @@ def review(
         begun = begin_review(opener, chosen, edits, files, told)
     server = open_server(begun, f"{Path(inputs[0]).stem}.clean", shlex.join(words), port)
     typer.echo(f"open {server.url}")
-    typer.echo("Ctrl+C ends it; every edit is in " + str(edits))
+    typer.echo("Ctrl+C ends it")
     server.run()
+    typer.echo(f"ended; {len(begun.log.entries):,} edits in {edits}")

@@ -8,6 +8,7 @@ from acceptance.product import clean, read, surefix
 from service.reviewed import WILD, again, begun, log, row_of
 from surefix.errors import InputError, OptionsError
 from surefix.io.edits import append_edit, read_edits
+from surefix.io.journal import Received, open_journal
 from surefix.service.review import pairs
 from surefix.service.review_choice import Part, chosen_rows, doubted, inside
 from surefix.types import Edit, Reason, Verdict
@@ -206,6 +207,27 @@ def test_the_column_of_the_input_is_the_beginning(tmp_path, edits):
     assert len(review.waiting(review.last)) == 1
     again(review)
     assert (review.last.edit == Edit.REJECT).sum() == 0
+
+
+def test_a_mission_is_reviewed_from_its_journal(tmp_path, edits):
+    globe = log(tmp_path / "globe.csv", 200, globe=True)
+    clean(globe, "-o", tmp_path / "boat.nmea")
+    mission = tmp_path / "mission.db"
+    journal = open_journal(f"sqlite:///{mission}")
+    journal.begin([("boat", "fixes")])
+    sent = (tmp_path / "boat.nmea").read_bytes()
+    cut = len(sent) // 2 + 7  # amid a sentence
+    parts = sent[:cut], sent[cut:]
+    journal.write([Received(n, 0, np.nan, part) for n, part in enumerate(parts, start=1)])
+    journal.close()
+    review = begun(edits, mission)
+    review.edit(review.last, row_of(review, 60), "reject")
+    again(review)
+    assert [part[:1] for part in read_edits(edits).entries[0].fixes] == [("boat",)]
+    clean(mission, "--edits", edits, "-o", tmp_path / "out.parquet")
+    by_command = read(tmp_path / "out.parquet")
+    np.testing.assert_array_equal(by_command.lat, review.last.shown.track.geodetic[:, 0])
+    assert by_command.row[by_command.verdict == "edited"].tolist() == [60]
 
 
 def _named(review, number):

@@ -136,8 +136,8 @@ const drawOne = async (of) => {
   return found;
 };
 const draw = tried(async () => {
-  const found = await drawOne("plan");
-  await drawOne("strips");
+  const found = { ...(await drawOne("plan")), ...(await drawOne("strips")) };
+  $("plan").parentElement.classList.toggle("none", !found.plan);
   legend($("legend"), found, page.marks, hidden, () => {
     plan.hide(hidden);
     strips.hide(hidden);

@@ -24,6 +24,7 @@ export const legend = (place, found, marks, hidden, changed) => {
   for (const figure of [found.plan, found.strips]) {
     for (const trace of figure ? figure.data : []) {
       const none = trace.name === "waits for a run" && !trace.x.length;
+      if (trace.name === "difference") continue; // its strip says what it is
       if (!none && trace.mode !== "markers+text" && !traces.has(trace.name)) {
         traces.set(trace.name, trace);
       }
