@@ -32,7 +32,7 @@ __all__ = [
     "no_hypotheses",
 ]
 
-MOST: Final = 64
+MOST: Final = 32
 """Hypotheses kept after each epoch."""
 
 MOST_SENSORS: Final = 62
@@ -91,7 +91,8 @@ class Prior(NamedTuple):
         (`MOST_SENSORS`,) how fast the noise of the positions of each sensor follows what is
         observed: 1 over the number of observations remembered, 0 for not at all.
     row
-        Probability that a fix is wrong by itself if the two before it were.
+        Probability that a fix is wrong by itself if the two before it were; learnt, but a row is
+        never surer to go on than a run.
     drag
         Probability that the fixes of a sensor begin to wander off, beside velocities, in a stretch
         of a few; 0: they never do.

@@ -36,7 +36,6 @@ _SHARES = {
     "manoeuvre": (0.02, 100.0),
     "row": (1.0, 3.0),
 }  # prior counts: wrong, and all
-_EVEN = 0.5  # most that a row is believed to go on: else what wanders would confirm itself
 _BIAS = 2.0  # standard deviations that velocities may be wrong by for good
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
@@ -227,7 +226,7 @@ def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) 
         partial=share("partial", some.sum()),
         poor=share("poor", poor.sum()),
         manoeuvre=share("manoeuvre", turns),
-        row=min(share("row", (after & alone[2:]).sum(), after.sum()), _EVEN),
+        row=min(share("row", (after & alone[2:]).sum(), after.sum()), 1.0 - prior.ending),
         spread=spread,
     )
 

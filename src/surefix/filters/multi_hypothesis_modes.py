@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
+from surefix.filters.hypothesis_disputes import settle_velocities
 from surefix.filters.hypothesis_lag import (
     Followed,
     filter_decided,
@@ -177,9 +178,12 @@ def decide_offline(
     back = Decisions(*(field[::-1] for field in turned))
     jump = _in_both(epochs.time, ahead.jump, back.jump, prior.longest)
     ahead, back = _settled(epochs.time, ahead, back, evidence - reverse[::-1], prior.longest)
-    said = Decisions(np.minimum(ahead.fixed, back.fixed), jump, ahead.run & back.run)
     d = motion.axes
-    slipped = np.maximum(ahead.fixed[:, d], back.fixed[:, d]) == 0.0
+    slips = ahead.fixed[:, d] == 0.0, back.fixed[:, d] == 0.0
+    slipped, used = settle_velocities(motion, prior, epochs, *slips)
+    fixed = np.minimum(ahead.fixed, back.fixed)
+    fixed[used, d:] = np.maximum(ahead.fixed, back.fixed)[used, d:]
+    said = Decisions(fixed, jump, ahead.run & back.run)
     locked = np.column_stack([said.run > 0, slipped])
     for _ in range(_SWEEPS):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))

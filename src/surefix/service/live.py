@@ -191,6 +191,7 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            await step(live, await inbox.take(0.01), clock())  # what has arrived is not lost
             if web is not None:
                 web.stop()
     except* (InputError, OutputError) as group:
