@@ -32,7 +32,7 @@ __all__ = [
     "no_hypotheses",
 ]
 
-MOST: Final = 64
+MOST: Final = 32
 """Hypotheses kept after each epoch."""
 
 MOST_SENSORS: Final = 62

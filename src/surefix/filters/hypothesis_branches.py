@@ -61,6 +61,7 @@ CONFIRMED = 3
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
+_STEPS = 40.0  # nats that a drag loses by a step of the velocities beside it
 _SLIPPED = 1.5  # variance of a velocity beside what it was off by in the mean, in its own
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
@@ -130,9 +131,11 @@ def velocity_branches(
             seen += 1
         outside = wild_product(square, wide, seen)
         bad, good = rarely, mostly
-        leaning = False  # a drag beside velocities that are wrong, too, explains everything
+        # A drag beside velocities that are wrong, too, explains everything: none steps meanwhile.
+        leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
+        stepped = leaning and distance > _STRANGE
+        leaning = leaning and (bank.faulty[k] >> sensor) & 1 != 0
         if (bank.faulty[k] >> sensor) & 1:
-            leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
             bad, good = again, over
             alike = 0.0
             for a in range(d):
@@ -143,7 +146,7 @@ def velocity_branches(
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
-            score[total] = base + inside + good
+            score[total] = base + inside + good - (_STEPS if stepped else 0.0)
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
             total += 1
@@ -328,7 +331,7 @@ def position_branches(
             parent[total], code[total] = i, says
             total += 1
         strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
-        if strange and not unknown:
+        if strange and not unknown and bank.length[k] >= CONFIRMED and bank.faulty[k] == 0:
             dragged = dragged_axes(prior, bank, k, z, time, sensor)
             if dragged:
                 score[total] = base + outside + burst

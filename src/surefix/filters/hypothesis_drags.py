@@ -1,8 +1,9 @@
 """Kernels on drags: the fixes of a sensor wander off, beside others that do not.
 
 Nothing shows when a drag begins, so that it is supposed now and then that one does, and what is
-supposed is kept however improbable it is. In a drag the track is what velocities and other sensors say. What the fixes are
-off by is followed by itself, ``[b, c]`` with c its rate: neither says anything of the track.
+supposed is kept however improbable it is. In a drag the track is what velocities and other sensors
+say. What the fixes are off by is followed by itself, ``[b, c]`` with c its rate: neither says
+anything of the track.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 
 from surefix.filters.hypotheses import DROP, POOR, RESTARTS, WALK, Bank, Prior
-from surefix.filters.hypothesis_density import log_normal, wrapped
+from surefix.filters.hypothesis_density import best_of, log_normal, wrapped
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -39,7 +40,8 @@ _BENDS = 0.05  # probability that the rate of a drag is another from one fix to 
 _FAR_OFF = 16.0  # squared distance from which an offset is no noise
 _SKEW = 0.02  # share of the speed that a velocity may be wrong by for good: a degree of heading
 _LONGEST = 300.0  # s, and …
-_RUNS = 5.0  # … longest runs, and times the age of the track: what lasts longer is no drag
+_RUNS = 8.0  # … longest runs: what lasts longer is no drag, …
+_AGES = 5.0  # … nor what lasts so many times as long as the track before it
 
 
 @inner
@@ -106,26 +108,24 @@ def supposes(prior: Prior, bank: Bank, place: IntArray, sensor: int) -> int:
     """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1."""
     if not prior.drag > 0.0 or len(place) < _PACE:
         return -1
-    first = -1
     for i in range(bank.number[0]):
         k = place[i]
         if bank.walks[k] and bank.run[k] == sensor and bank.length[k] < _PACE:
             return -1
-        if first < 0 and bank.run[k] < 0 and bank.faulty[k] == 0:
-            first = i
-    return first
+    best = best_of(bank.weight, bank.number[0])
+    return best if bank.run[place[best]] < 0 and bank.faulty[place[best]] == 0 else -1
 
 
 @lean_helper
 def outlasts(prior: Prior, bank: Bank, k: int, time: float) -> bool:
     """Whether a drag has lasted longer than any may."""
     longest = max(_RUNS * prior.longest, _LONGEST)
-    return time - bank.opened[k] >= min(longest, _RUNS * (bank.opened[k] - bank.began[k]))
+    return time - bank.opened[k] >= min(longest, _AGES * (bank.opened[k] - bank.began[k]))
 
 
 @inner
 def _bend(prior: Prior, bank: Bank, k: int, a: int, time: float) -> float:
-    """How far the offset may be off, squared, if its rate changed about the last fix of the drag."""
+    """How far, squared, the offset may be off if its rate changed about the last fix."""
     far = 2.0 * _rate(prior, a) * (time - bank.drift[k, a, 3])
     return far * far
 

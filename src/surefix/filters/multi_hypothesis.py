@@ -42,7 +42,6 @@ from surefix.filters.hypothesis_axis import (
 )
 from surefix.filters.hypothesis_bank import (
     apply_position,
-    best_of,
     give_rows,
     keep_best,
     merge,
@@ -55,6 +54,7 @@ from surefix.filters.hypothesis_branches import (
     slipped,
     velocity_branches,
 )
+from surefix.filters.hypothesis_density import best_of
 from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for

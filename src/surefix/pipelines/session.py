@@ -46,8 +46,8 @@ def begin_session(
     live
         Whether an input may fall silent: one that is ``reorder_s`` behind is waited for no longer.
     """
-    names, roles = [name for name, _ in inputs], [role for _, role in inputs]
-    merging = begin_merging(roles, options.reorder_s if live else np.inf)
+    names = [name for name, _ in inputs]
+    merging = begin_merging(inputs, options.reorder_s if live else np.inf)
     return Session(options=options, names=tuple(names), merging=merging, estimator=estimator)
 
 

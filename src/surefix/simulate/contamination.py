@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surefix.errors import OptionsError
 from surefix.simulate.drags import Drag, pull_of
@@ -319,7 +320,7 @@ def columns(trial: Trial) -> dict[str, FloatArray]:
     return table
 
 
-def columns_beside(trial: Trial) -> dict[str, FloatArray | TextArray] | None:
+def columns_beside(trial: Trial) -> dict[str, NDArray[np.generic]] | None:
     """Columns of the log of the sensor beside the fixes; None where there is none."""
     match trial.scenario.beside:
         case "source":
