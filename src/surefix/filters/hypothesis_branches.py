@@ -246,7 +246,7 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
-    drags = -1 if decided else supposes(prior, bank, place, sensor)
+    drags = -1 if decided else supposes(prior, bank, place, time, sensor)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
@@ -331,7 +331,8 @@ def position_branches(
             parent[total], code[total] = i, says
             total += 1
         strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
-        if strange and not unknown and bank.length[k] >= CONFIRMED and bank.faulty[k] == 0:
+        strange = strange and time - bank.startled[0] > prior.longest
+        if strange and not unknown and bank.length[k] >= CONFIRMED:
             dragged = dragged_axes(prior, bank, k, z, time, sensor)
             if dragged:
                 score[total] = base + outside + burst

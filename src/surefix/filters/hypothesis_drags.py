@@ -27,6 +27,7 @@ __all__ = [
     "make_certain",
     "outlasts",
     "predict_drag",
+    "startles",
     "supposes",
 ]
 
@@ -38,6 +39,7 @@ _CLASSES = 3  # of ages
 _HOPELESS = 50.0  # nats below the best, where a drag is given up
 _BENDS = 0.05  # probability that the rate of a drag is another from one fix to the next
 _FAR_OFF = 16.0  # squared distance from which an offset is no noise
+_STARTLES = 25.0  # … and from which a velocity has stepped
 _SKEW = 0.02  # share of the speed that a velocity may be wrong by for good: a degree of heading
 _LONGEST = 300.0  # s, and …
 _RUNS = 8.0  # … longest runs: what lasts longer is no drag, …
@@ -103,10 +105,24 @@ def leans(prior: Prior, bank: Bank, k: int, time: float) -> bool:
     return False
 
 
+@inner
+def startles(motion: Motion, standardised: FloatArray) -> bool:
+    """Whether a velocity is far from what the likeliest hypothesis expects."""
+    total = 0.0
+    for a in range(motion.axes):
+        off = standardised[motion.axes + a]
+        total += 0.0 if math.isnan(off) else off * off
+    return total > _STARTLES
+
+
 @lean_helper
-def supposes(prior: Prior, bank: Bank, place: IntArray, sensor: int) -> int:
-    """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1."""
-    if not prior.drag > 0.0 or len(place) < _PACE:
+def supposes(prior: Prior, bank: Bank, place: IntArray, time: float, sensor: int) -> int:
+    """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1.
+
+    None is after velocities that stepped: they may be wrong, and the fixes right.
+    """
+    calm = time - bank.startled[0] > prior.longest
+    if not prior.drag > 0.0 or len(place) < _PACE or not calm:
         return -1
     for i in range(bank.number[0]):
         k = place[i]

@@ -55,7 +55,7 @@ from surefix.filters.hypothesis_branches import (
     velocity_branches,
 )
 from surefix.filters.hypothesis_density import best_of
-from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
+from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag, startles
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
@@ -66,7 +66,10 @@ from surefix.types import FloatArray, IntArray
 __all__ = ["filter_hypotheses"]
 
 _LEARNS = 0.5  # of how much a velocity is off by a further one that is off alike
-_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard"})
+_WHOLE = {"time", "number", "weight", "scale", "announced", "startled", "heard"}
+_BY_ROW = tuple(set(Bank._fields) - _WHOLE)
+    set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard", "startled"}
+)
 
 
 @inner
@@ -252,6 +255,8 @@ def _run(
                         drift = bank.drift[place[i], a]
                         predict_drag(m, P, drift, motion.order, dt, prior.longest)
         innovate(motion, bank, place, k, z, r, found, work.noise)
+        if moved and startles(motion, found.standardised[k]):
+            bank.startled[0] = time
         for stage in range(2):
             if stage == 0 and moved:
                 total = velocity_branches(
