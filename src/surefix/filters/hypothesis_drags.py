@@ -71,7 +71,8 @@ def predict_drag(
 @inner
 def _rate(prior: Prior, a: int) -> float:
     """Scale of the rates of drags: they reach the size of gross errors in a longest run."""
-    return prior.spread[a] / prior.longest
+    size: float = prior.spread[a]
+    return size / prior.longest
 
 
 @inner
@@ -136,13 +137,15 @@ def supposes(prior: Prior, bank: Bank, place: IntArray, time: float, sensor: int
 def outlasts(prior: Prior, bank: Bank, k: int, time: float) -> bool:
     """Whether a drag has lasted longer than any may."""
     longest = max(_RUNS * prior.longest, _LONGEST)
-    return time - bank.opened[k] >= min(longest, _AGES * (bank.opened[k] - bank.began[k]))
+    lasted: float = time - bank.opened[k]
+    age: float = bank.opened[k] - bank.began[k]
+    return lasted >= min(longest, _AGES * age)
 
 
 @inner
 def _bend(prior: Prior, bank: Bank, k: int, a: int, time: float) -> float:
     """How far, squared, the offset may be off if its rate changed about the last fix."""
-    far = 2.0 * _rate(prior, a) * (time - bank.drift[k, a, 3])
+    far: float = 2.0 * _rate(prior, a) * (time - bank.drift[k, a, 3])
     return far * far
 
 
@@ -246,8 +249,8 @@ def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
 def _uncertain(bank: Bank, k: int, code: int) -> bool:
     """Whether a candidate comes from a drag, or begins one, that may be none."""
     if bank.walks[k]:
-        return bank.walks[k] & CERTAIN == 0
-    return code & WALK != 0 and bank.run[k] < 0
+        return int(bank.walks[k]) & CERTAIN == 0
+    return code & WALK != 0 and int(bank.run[k]) < 0
 
 
 @inner
