@@ -7,7 +7,7 @@ TESTS = Path(__file__).parents[1]
 ELSEWHERE = {
     21: "acceptance/test_edges_of_the_earth.py::test_the_antimeridian_changes_nothing",
     22: "acceptance/test_edges_of_the_earth.py::test_across_the_pole",
-    34: "service/test_failures.py::",
+    34: "service/test_failures.py::test_one_of_two_receivers_fails_and_returns",
 }
 
 

@@ -263,12 +263,12 @@ def test_fault_33_a_clock_that_drifts_for_a_day(tmp_path):
         return sentence(f"GPRMC,{clock},A,{where},0.00,,010826,,,A")
 
     async def run():
-        for begin in range(0, 86_400, 1800):
-            seconds = range(begin, begin + 1800, 60)
+        for begin in range(0, 86_400, 3600):
+            seconds = range(begin, begin + 3600, 300)
             arrived = [Arrived(0, start + 1.0001 * second, fix(second)) for second in seconds]
             await step(live, arrived, arrived[-1].time)
         known = live.now.time
-        assert known == start + 86_340.0
+        assert known == start + 86_100.0
         await step(live, [], arrived[-1].time + 2.0)
         assert abs(live.now.time - (known + 2.0)) < 0.01
 
