@@ -72,8 +72,8 @@ class Served:
         self.web.stop()
 
     def call(self, coroutine):
-        """Run something where the service lives."""
-        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(300.0)  # kernels may be compiled first
+        """Run something where the service lives; kernels may have to be compiled for it."""
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(300.0)
 
     async def set(self, **values):
         """Change the service from within."""
