@@ -63,7 +63,7 @@ fuzz: $(INSTALLED)
 	PYTHONPATH=tests NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m faults.fuzz
 
 soak: $(INSTALLED)
-	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python bench/soak.py
+	PYTHONPATH=tests NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m service.soak
 
 # Peers live in an environment of their own, and one that cannot be installed is left out.
 bench: $(BENCH)/.installed

@@ -27,7 +27,7 @@ from surefix.simulate.contamination import SCENARIOS, World, alone, draw
 EPOCHS = 20_000
 ROUNDS = 7
 LAG = 40.0  # intervals
-MOST = (16, 64)
+MOST = (16, 32, 64)
 SCENARIO = "isolated-20"
 
 Row = dict[str, float | int | str]

@@ -1,9 +1,9 @@
 """Hold the default method against the oracle in worlds drawn at random, and list what is missed.
 
-Run ``python bench/sweep.py --seed 7 --count 100``. Case i of a seed is drawn from ``[seed, i]``: a row
-of the table of `BOUNDS`, one to three axes, noise of 0.05 … 5 m, 0.2 … 20 fixes a second, how
-nimbly the vehicle moves, with velocities or without. Nothing is told but the log. The same case
-is drawn again by ``--only i``.
+Run ``python bench/sweep.py --seed 7 --count 100``. Case i of a seed is drawn from ``[seed, i]``: a
+row of `BOUNDS`, one to three axes, noise of 0.05 … 5 m, 0.2 … 20 fixes a second, how nimbly the
+vehicle moves, with velocities or without. Nothing is told but the log. The same case is drawn
+again by ``--only i``.
 """
 
 from __future__ import annotations

@@ -25,8 +25,10 @@ _SHOWN = 5  # stretches of rows
 
 def edit(
     inputs: Annotated[
-        list[Path] | None,
-        typer.Argument(help="The logs, to find the fixes in.", show_default=False),
+        list[str] | None,
+        typer.Argument(
+            help="The logs, to find the fixes in.", show_default=False, metavar="INPUTS..."
+        ),
     ] = None,
     edits: Annotated[
         Path, typer.Option(help="The edit log; begun if it is not there.", show_default=False)
@@ -84,7 +86,7 @@ def edit(
         if not inputs or wanted is None:
             expected = "a log, and --rows, --since, --until or --sensor"
             raise OptionsError(f"--{actions[0]} without fixes", expected)
-        keep_inputs(inputs, [edits])
+        keep_inputs([Path(each) for each in inputs], [edits])
         sources = open_inputs(
             inputs,
             columns=mapping(column or []),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -30,13 +31,18 @@ if TYPE_CHECKING:
 
 __all__ = ["review"]
 
+_SECRET = re.compile(r"(://[^/@:]*:)[^/@]*@")  # a password in a URL
 _NEEDED = ("fastapi", "plotly", "uvicorn")
 
 
 def review(
     inputs: Annotated[
-        list[Path],
-        typer.Argument(help="Logs, or the journal of a mission.", show_default=False),
+        list[str],
+        typer.Argument(
+            help="Logs, or the journal of a live service, a file or a URL.",
+            show_default=False,
+            metavar="INPUTS...",
+        ),
     ],
     edits: Annotated[
         Path, typer.Option(help="The edit log; begun if it is not there.", show_default=False)
@@ -69,7 +75,7 @@ def review(
 
     chosen, columns = chosen_options(options, {"mode": mode}, {})
     supporting = [path for path in (depth, velocity, heading) if path is not None]
-    files = [*inputs, *supporting]
+    files = [*map(Path, inputs), *supporting]
     keep_inputs([*files, *([options] if options is not None else [])], [edits])
 
     def opener(told: Progress | None) -> list[Source]:
@@ -94,13 +100,14 @@ def review(
         "--column": column or [],
         "--edits": [edits],
     }
-    words = ["surefix", "clean", *map(str, inputs)]
+    words = ["surefix", "clean", *(_SECRET.sub(r"\1…@", each) for each in inputs)]
     for name, values in given.items():
         words += [word for value in values if value is not None for word in (name, str(value))]
     words += ["--no-checksum"] if no_checksum else []
     with announced(), over_bytes(files, quiet=False) as told:
         begun = begin_review(opener, chosen, edits, files, told)
-    server = open_server(begun, f"{inputs[0].stem}.clean", shlex.join(words), port)
+    server = open_server(begun, f"{Path(inputs[0]).stem}.clean", shlex.join(words), port)
     typer.echo(f"open {server.url}")
-    typer.echo("Ctrl+C ends it; every edit is in " + str(edits))
+    typer.echo("Ctrl+C ends it")
     server.run()
+    typer.echo(f"ended; {len(begun.log.entries):,} edits in {edits}")

@@ -75,6 +75,10 @@ def _text(
             known = any(math.isfinite(value) for value in offset)
             by = f" with offset {vector(offset)}" if known else ""
             return f"in a run of {int(detail)}{by}, {sigma:.1f} σ off"
+        case Reason.DRAG:
+            return (
+                f"in a drag of {int(detail)} fixes, offset now {vector(offset)}, {sigma:.1f} σ off"
+            )
         case Reason.JUMP:
             return f"jump accepted, dated back to {clock(detail)}"
         case Reason.REPEATED:

@@ -152,7 +152,7 @@ class Event(NamedTuple):
     Parameters
     ----------
     kind
-        ``gap``, ``clock-step``, ``misdated``, ``week-rollover``, ``jump``, ``run``,
+        ``gap``, ``clock-step``, ``misdated``, ``week-rollover``, ``jump``, ``run``, ``drag``,
         ``sensor-suspect``, ``sensor-trusted``, ``noise-changed``, ``held``, ``idle-axis``,
         ``height-offset``, ``latency`` or ``note``.
     time
@@ -182,8 +182,6 @@ class Log:
     events: tuple[Event, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     """Records met by kind (sentence type, row); for `surefix info`."""
-    delays: tuple[Channel, ...] = ()
-    """Of a stream, by sensor: how long after its validity each observation was received, s."""
     depth_positive_down: bool = False
     """True where the third axis was given as a depth (height = −depth)."""
 
@@ -206,6 +204,7 @@ class Reason(IntEnum):
     REJECTED_BY_USER = 12
     RUN = 13
     ISOLATED = 14
+    DRAG = 15
 
 
 class Verdicts(NamedTuple):
@@ -227,9 +226,10 @@ class Verdicts(NamedTuple):
         (n,) codes of `Reason`.
     detail
         (n,) the figure that goes with the reason: a time in s (JUMP, HELD, LATE: the time it refers
-        to), an axis mask (AXIS_OFF: bits 0, 1, 2 for x, y, z) or a number of fixes (RUN).
+        to), an axis mask (AXIS_OFF: bits 0, 1, 2 for x, y, z) or a number of fixes (RUN, DRAG).
     offset
-        (n, 3) m, the common offset of the run that the observation belongs to; NaN outside of runs.
+        (n, 3) m, the common offset of the run that the observation belongs to, or its own in a
+        drag; NaN outside of both.
     """
 
     verdict: IntArray

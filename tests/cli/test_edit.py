@@ -1,9 +1,14 @@
 """Edits on the command line: made, undone, listed, and obeyed by `surefix clean`."""
 
+import json
+import signal
+import subprocess
+from urllib.request import Request, urlopen
+
 import numpy as np
 import pytest
 
-from acceptance.product import clean, read, surefix
+from acceptance.product import PROGRAM, clean, read, surefix
 
 
 @pytest.fixture
@@ -92,3 +97,42 @@ def test_without_edits_it_is_as_without_a_log(log, tmp_path, run):
     clean(log, "--edits", tmp_path / "edits.jsonl", "-o", tmp_path / "edited.csv")
     assert (tmp_path / "plain.csv").read_bytes() == (tmp_path / "edited.csv").read_bytes()
     assert np.isfinite(read(tmp_path / "plain.csv").x).any()
+
+
+def test_review_serves_its_page_until_it_is_interrupted(log, tmp_path):
+    pytest.importorskip("fastapi")
+    words = "review", log, "--edits", tmp_path / "edits.jsonl"
+    command = [*PROGRAM, *(str(word) for word in words)]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        address = server.stdout.readline().removeprefix("open ").strip()
+        place, _, token = address.partition("#")
+        ask = Request(f"{place}api/state", headers={"Authorization": f"Bearer {token}"})
+        with urlopen(ask, timeout=30) as answer:
+            said = json.load(answer)
+        server.send_signal(signal.SIGINT)
+        rest, _ = server.communicate(timeout=30)
+    finally:
+        server.kill()
+        server.communicate()
+    assert said["sources"] == ["dive.csv"]
+    assert said["command"] == f"surefix clean {log} --edits {tmp_path / 'edits.jsonl'}"
+    assert said["waiting"] == 0
+    assert server.returncode == 0
+    assert "ended; 0 edits" in rest
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("none.csv",), "none.csv: No such file"),
+        (("LOG", "--edits", "LOG"), "is also an input"),
+        (("LOG", "--options", "none.toml"), "none.toml"),
+        (("LOG", "--mode", "sideways"), "sideways"),
+    ],
+)
+def test_review_tells_what_is_wrong(log, run, words, said):
+    code, told = run("review", *(log if word == "LOG" else word for word in words))
+    assert code in (1, 2)
+    assert said in told
+    assert "Traceback" not in told

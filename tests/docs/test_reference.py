@@ -162,7 +162,9 @@ def test_options_are_all_there_with_their_defaults():
         if field.default in (None, MISSING):
             assert "`" not in default, name
         else:
-            written = {True: "true", False: "false"}.get(field.default, field.default)
+            written = field.default
+            if isinstance(written, bool):
+                written = str(written).lower()
             written = f'"{written}"' if isinstance(field.default, str) else str(written)
             assert default == f"`{written}`"
 

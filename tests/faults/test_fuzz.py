@@ -64,6 +64,12 @@ def test_as_files(tmp_path):
         fuzz.read(seed, tmp_path)
 
 
+def test_what_it_has_found():
+    """A NUL for a letter was taken for an empty field by the kernel alone."""
+    data = b"$HCHDG,101.1,2.5,\x00,7.1,E*07\r\n"
+    assert fuzz.told(fuzz.by_kernel(data)) == fuzz.told(fuzz.by_stream(data))
+
+
 def test_the_checks_can_fail(monkeypatch):
     """A reader that loses one record in ten thousand is found out."""
     whole = fuzz.by_kernel

@@ -16,7 +16,7 @@ MOTION = Motion(2, 1, np.ones(1), by_axis(1), 2, 0.0)
 PRIOR = supposed(1, 1.0, 1.0, 1.0, 40.0)
 
 
-def judged(off, wrong, *, row, k, run=(), far=60.0):
+def judged(off, wrong, *, row, k, run=(), far=60.0, longest=40.0):
     """Weight of fix k, which is ``off``, if the fixes ``wrong`` are left out; noise is 1."""
     z = np.full((N, 2), np.nan)
     z[:, 0] = np.where(wrong, far, 0.0)
@@ -35,7 +35,8 @@ def judged(off, wrong, *, row, k, run=(), far=60.0):
     locked = np.zeros((N, 2), np.bool_)
     locked[list(run), 0] = True
     sure = Smoothed(np.zeros((N, 2)), np.full((N, 2, 2), 1e-12))
-    return review(MOTION, PRIOR._replace(row=row), epochs, fixed, sure, locked)[k, 0]
+    prior = PRIOR._replace(row=row, longest=longest)
+    return review(MOTION, prior, epochs, fixed, sure, locked)[k, 0]
 
 
 def chain(wrong, row):
@@ -83,3 +84,10 @@ def test_what_is_hardly_wrong_makes_no_row():
     wrong = np.array([True, True, True, False, True, True, True])
     for far, used in ((5.0, True), (7.0, False)):
         assert (judged(1.5, wrong, row=0.85, k=3, far=far) > 0.0) == used
+
+
+def test_what_lasts_as_long_as_the_longest_run_is_no_row():
+    """Three before and three after, each of them over two intervals."""
+    wrong = np.array([True, True, True, False, True, True, True])
+    for longest, used in ((2.5, False), (2.0, True)):
+        assert (judged(1.5, wrong, row=0.85, k=3, longest=longest) > 0.0) == used

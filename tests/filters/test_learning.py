@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from surefix.filters import learning
 from surefix.filters.learning import learn, likelihood, supposed
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise
 from surefix.simulate.contamination import alone, draw, draw_world
@@ -151,6 +152,34 @@ def test_a_row_is_never_surer_to_go_on_than_a_run():
     prior = learnt(trial).prior
     assert prior.row == pytest.approx(1.0 - prior.ending)
     assert prior.isolated == pytest.approx(108 / 600, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", ["aided", "alone"])
+def test_fixes_of_a_run_do_not_count_as_wrong_by_themselves(kind):
+    """30 of 600 fixes, as many more as err by themselves."""
+    for seed in range(4):
+        trial = trial_of("burst-common", kind, seed)
+        prior = learnt(trial).prior
+        alone_too = trial.bad_fix.any(axis=1).sum() - 30
+        assert prior.isolated == pytest.approx(alone_too / 600, abs=0.01)
+        assert prior.row < 0.5
+
+
+def test_nothing_is_supposed_of_rows_where_learning_begins(monkeypatch):
+    """After two wrong fixes the next is as likely wrong as any, whatever rows will be."""
+    seen = observed(trial_of("burst-independent", "alone", 1))
+    first, asked, evidence = estimate_noise(seen, UNKNOWN), [], learning._evidence
+    monkeypatch.setattr(
+        learning, "_evidence", lambda *given: asked.append(given[2]) or evidence(*given)
+    )
+    monkeypatch.setattr(learning, "_ROUNDS", 0)  # what it begins with
+    settings = {"order": 2, "period": 0.0, "speed": 20.0, "longest": 40.0}
+    likelihood(seen, first, **settings)
+    assert len(asked) == 1
+    begun = learn(seen, UNKNOWN, first, **settings, floor=TINY)
+    assert len(asked) > 2
+    assert all(prior.row == prior.isolated == 0.2 for prior in asked)
+    assert begun.prior.row == 0.3
 
 
 def test_what_the_user_knows_stays():

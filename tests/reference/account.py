@@ -37,6 +37,7 @@ class Account(NamedTuple):
     length: int = 0
     faulty: frozenset = frozenset()
     slip: tuple = ()
+    heard: dict = {}  # noqa: RUF012
     lost: tuple = ()
     rate: tuple = ()
     turns: tuple = ()

@@ -28,6 +28,7 @@ CONFIRMED = 3
 ROW = 2  # wrong fixes on end after which the next is likely to be wrong
 PREFERS = 3.0
 ALIKE = 0.7
+SLIPPED, LEARNS = 1.5, 0.5
 PATIENCE, AIDED = 1.25, 5.0
 ANEW = 0.1
 HASTE = 2.0
@@ -78,6 +79,8 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
             accounts, gain = _kept(many, far)
             evidence += gain
         accounts = [_lasting(prior, account, time) for account in accounts]
+        now = {(sensor, a): time for a in range(d) if not np.isnan(z[d + a])}
+        accounts = [account._replace(heard=account.heard | now) for account in accounts]
         if alike > 0.0:
             accounts = _united(motion, prior, steps, accounts, alike)
         out.append(_mixture(motion, prior, steps, accounts, evidence))
@@ -124,6 +127,12 @@ def _same(figures, offsets, others, their_offsets, alike):
     return ((other - m) ** 2 / P).sum() <= alike and (np.abs(ratio - 1.0) <= 0.05).all()
 
 
+def _slipped(motion, account, a, time, sensor, r):
+    """Variance of how a wrong velocity differs from what it was off by before."""
+    gap = time - account.heard.get((sensor, a), time)
+    return 2.0 * motion.density[a] * gap * reach(motion.order, 1, gap) ** 2 + SLIPPED * r
+
+
 def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     """Belongs, usual or poor, or is wrong."""
     d, step = motion.axes, len(steps) - 1
@@ -134,16 +143,20 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     poor = sum(normal(nu[a], S[a] + (POOR - 1.0) * r[d + a]) for a in seen) + np.log(prior.poor)
     wide = np.array([prior.spread[d + a] ** 2 + S[a] for a in seen])
     outside = cauchy(np.array([nu[a] for a in seen]) ** 2 / wide, wide)
-    wrong = prior.velocity
+    wrong, same = prior.velocity, 1.0
     if sensor in account.faulty:
         wrong = prior.again
-        alike = sum(normal(nu[a] - account.slip[a], S[a] + r[d + a]) for a in seen)
+        off = {a: nu[a] - account.slip[a] for a in seen}
+        change = {a: _slipped(motion, account, a, time, sensor, r[d + a]) for a in seen}
+        alike = sum(normal(off[a], change[a]) for a in seen)
+        if sum(off[a] ** 2 / change[a] for a in seen) < GROSS:
+            same = LEARNS
         outside = np.logaddexp(outside + np.log(1.0 - ALIKE), alike + np.log(ALIKE))
     rows, slip = account.rows, account.slip
     for a in seen:
         variance = r[d + a] * (POOR if poor > usual else 1.0)
         rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
-        slip = put(slip, a, nu[a])
+        slip = put(slip, a, slip[a] + same * (nu[a] - slip[a]))
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty, touched = account.faulty, account.touched
     for a in seen:

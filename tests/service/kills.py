@@ -140,8 +140,9 @@ class Forked:
 
     def close(self):
         self.parent.stdin.close()
-        self.parent.wait(10.0)
         self.parent.stdout.close()
+        self.parent.kill()
+        self.parent.wait(60.0)
 
 
 def restart(mission, seconds):

@@ -190,7 +190,12 @@ def test_a_journal_that_another_service_carried_on_is_left_to_it(tmp_path, postg
 def test_a_mission_in_postgresql_is_cleaned_by_its_url(tmp_path, postgres):
     url = postgres.database()
     live = service(tmp_path, url)
-    asyncio.run(feed(live))
+
+    async def run():
+        await feed(live)
+        await caught_up(live)
+
+    asyncio.run(run())
     live.journal.close()
     log = tmp_path / "boat.nmea"
     log.write_bytes(recorded())

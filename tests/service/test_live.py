@@ -22,10 +22,10 @@ from surefix.io.journal import open_journal
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.joining import join
-from surefix.service import live as service
 from surefix.service.live import begin_live, run_live
 from surefix.service.options import read_live
 from surefix.service.station import begin_station, receive, stored
+from surefix.service.telling import epoch_of
 
 SUREFIX = Path(sys.executable).with_name("surefix")
 _LIVE = """
@@ -197,7 +197,7 @@ def test_dead_reckoning_when_nothing_comes(tmp_path):
     assert sigmas[-1] > known.sigma_position[0]
     assert not math.isnan(live.now.observed)
     assert live.now.time - live.now.observed > 10.0
-    assert service._epoch(live.now).known is False
+    assert epoch_of(live.now).known is False
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from acceptance.product import clean, read, surefix
 from service.reviewed import WILD, again, begun, log, row_of
 from surefix.errors import InputError, OptionsError
 from surefix.io.edits import append_edit, read_edits
+from surefix.io.journal import Received, open_journal
 from surefix.service.review import pairs
 from surefix.service.review_choice import Part, chosen_rows, doubted, inside
 from surefix.types import Edit, Reason, Verdict
@@ -50,7 +51,7 @@ def test_logs_with_the_same_sensor_and_rows_are_told_apart(tmp_path, edits):
     sources = [source for source, _, _ in fixes(review)]
     assert sources == ["one.csv"] * 70 + ["two.csv"] * 80
     rows = np.flatnonzero(review.last.shown.row == 20)
-    review.edit(rows[1:], "reject")
+    review.edit(review.last, rows[1:], "reject")
     assert [part[:2] for part in read_edits(edits).entries[0].fixes] == [("two.csv", "usbl")]
     again(review)
     shown = review.last.shown.verdicts
@@ -59,21 +60,21 @@ def test_logs_with_the_same_sensor_and_rows_are_told_apart(tmp_path, edits):
 
 def test_edits_wait_for_a_run_and_undone_ones_do_not(tmp_path, edits):
     review = begun(edits, log(tmp_path / "dive.csv"))
-    assert review.waiting().size == 0
+    assert review.waiting(review.last).size == 0
     rows = np.concatenate([row_of(review, 60), row_of(review, 10)])
-    review.edit(rows, "reject")
-    assert sorted(review.waiting()) == sorted(rows)
+    review.edit(review.last, rows, "reject")
+    assert sorted(review.waiting(review.last)) == sorted(rows)
     review.step("undo")
-    assert review.waiting().size == 0
+    assert review.waiting(review.last).size == 0
     review.step("redo")
     with pytest.raises(OptionsError, match="redo"):
         review.step("redo")
     again(review)
-    assert review.waiting().size == 0
+    assert review.waiting(review.last).size == 0
     assert review.last.number == 2
     verdicts = review.last.shown.verdicts.verdict
     assert (verdicts == Verdict.EDITED).sum() == 2
-    review.edit(row_of(review, 60), "restore")
+    review.edit(review.last, row_of(review, 60), "restore")
     again(review)
     assert (review.last.shown.verdicts.verdict == Verdict.EDITED).sum() == 1
 
@@ -82,7 +83,7 @@ def test_edits_by_others_are_seen(tmp_path, edits):
     place = log(tmp_path / "dive.csv")
     review = begun(edits, place)
     assert surefix("edit", place, "--reject", "--rows", "5-9", "--edits", edits).code == 0
-    assert len(review.waiting()) == 5
+    assert len(review.waiting(review.last)) == 5
     assert len(review.log.entries) == 1
 
 
@@ -90,8 +91,10 @@ def test_edits_by_others_are_seen(tmp_path, edits):
 def test_a_run_is_surefix_clean(tmp_path, edits, mode):
     place = log(tmp_path / "dive.csv")
     review = begun(edits, place, mode=mode)
-    review.edit(row_of(review, 111), "accept")
-    review.edit(np.concatenate([row_of(review, row) for row in range(200, 206)]), "reject")
+    review.edit(review.last, row_of(review, 111), "accept")
+    review.edit(
+        review.last, np.concatenate([row_of(review, row) for row in range(200, 206)]), "reject"
+    )
     again(review)
     clean(place, "--mode", mode, "--edits", edits, "-o", tmp_path / "out.parquet")
     by_command, shown = read(tmp_path / "out.parquet"), review.last.shown
@@ -133,7 +136,7 @@ def test_a_log_that_grew_is_compared_on_what_both_runs_have(tmp_path, edits):
 def test_runs_share_a_frame(tmp_path, edits):
     place = log(tmp_path / "globe.csv", 200, globe=True)
     review = begun(edits, place)
-    review.edit(np.arange(120), "reject")  # the middle of the rest lies elsewhere
+    review.edit(review.last, np.arange(120), "reject")  # the middle of the rest lies elsewhere
     again(review)
     first, last = review.first.shown, review.last.shown
     mine, theirs = pairs(review.last, review.first)
@@ -198,12 +201,33 @@ def test_the_column_of_the_input_is_the_beginning(tmp_path, edits):
     table.loc[30, "edit"] = "reject"
     table.to_csv(place, index=False)
     review = begun(edits, place)
-    assert review.waiting().size == 0
+    assert review.waiting(review.last).size == 0
     assert (review.last.edit == Edit.REJECT).sum() == 1
-    append_edit(edits, "restore", review.last and _named(review, 30))
-    assert len(review.waiting()) == 1
+    append_edit(edits, "restore", _named(review, 30))
+    assert len(review.waiting(review.last)) == 1
     again(review)
     assert (review.last.edit == Edit.REJECT).sum() == 0
+
+
+def test_a_mission_is_reviewed_from_its_journal(tmp_path, edits):
+    globe = log(tmp_path / "globe.csv", 200, globe=True)
+    clean(globe, "-o", tmp_path / "boat.nmea")
+    mission = tmp_path / "mission.db"
+    journal = open_journal(f"sqlite:///{mission}")
+    journal.begin([("boat", "fixes")])
+    sent = (tmp_path / "boat.nmea").read_bytes()
+    cut = len(sent) // 2 + 7  # amid a sentence
+    parts = sent[:cut], sent[cut:]
+    journal.write([Received(n, 0, np.nan, part) for n, part in enumerate(parts, start=1)])
+    journal.close()
+    review = begun(edits, mission)
+    review.edit(review.last, row_of(review, 60), "reject")
+    again(review)
+    assert [part[:1] for part in read_edits(edits).entries[0].fixes] == [("boat",)]
+    clean(mission, "--edits", edits, "-o", tmp_path / "out.parquet")
+    by_command = read(tmp_path / "out.parquet")
+    np.testing.assert_array_equal(by_command.lat, review.last.shown.track.geodetic[:, 0])
+    assert by_command.row[by_command.verdict == "edited"].tolist() == [60]
 
 
 def _named(review, number):

@@ -11,8 +11,8 @@ from service.test_station import CLEAN, recorded, sentence, station_of
 from surefix.geo.angle import wrap
 from surefix.io.journal import Received
 from surefix.io.write_nmea import LONGEST, TYPES, sentences
-from surefix.service.live import _epoch
 from surefix.service.station import Latest, latest, receive
+from surefix.service.telling import epoch_of
 
 NOON = 1_785_585_600.0  # 2026-08-01T12:00:00Z, when the boat of `recorded` sets out
 
@@ -99,7 +99,7 @@ def test_no_heading_before_its_series_is_settled():
             station, _ = receive(station, [Received(0, 0, math.nan, line)])
     now = latest(station)
     assert math.isnan(now.heading)
-    text = sentences(_epoch(now)).decode()
+    text = sentences(epoch_of(now)).decode()
     assert "HDT" not in text
     assert "GGA" in text
     assert CLEAN.settle_rows == 40
@@ -115,6 +115,6 @@ def test_whatever_is_known_no_sentence_is_too_long(
     time, position, velocity, sigma, geodetic, observed, turned, depth
 ):
     now = Latest(time, position, velocity, sigma, sigma, geodetic, observed, turned, depth)
-    for text in sentences(_epoch(now), types=(*TYPES, "GBS"), talker="IN").splitlines(True):
+    for text in sentences(epoch_of(now), types=(*TYPES, "GBS"), talker="IN").splitlines(True):
         assert text.endswith(b"\r\n")
         assert len(text) <= LONGEST

@@ -72,7 +72,7 @@ class Served:
         self.web.stop()
 
     def call(self, coroutine):
-        """Run something where the service lives; kernels may have to be compiled for it."""
+        """Run something where the service lives; kernels may be compiled first."""
         return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(300.0)
 
     async def set(self, **values):

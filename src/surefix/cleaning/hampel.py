@@ -109,7 +109,7 @@ def _median_and_mad(x: FloatArray, window: int, ahead: int) -> tuple[FloatArray,
             ordered[place] = x[k]
             count += 1
         if k >= window and not np.isnan(x[k - window]):
-            place = np.searchsorted(ordered[:count], x[k - window])
+            place = _place(ordered, count, x[k - window])
             for i in range(place, count - 1):
                 ordered[i] = ordered[i + 1]
             count -= 1
@@ -121,9 +121,22 @@ def _median_and_mad(x: FloatArray, window: int, ahead: int) -> tuple[FloatArray,
 
 
 @helper
+def _place(ordered: FloatArray, count: int, value: float) -> int:
+    """How many of the first ``count`` values are smaller than one."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if ordered[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@helper
 def _mad(ordered: FloatArray, count: int, middle: float) -> float:
     """Median of |ordered − middle|: the nearest values are taken from the middle outwards."""
-    right = int(np.searchsorted(ordered[:count], middle))
+    right = _place(ordered, count, middle)
     left = right - 1
     before = last = 0.0
     for _ in range(count // 2 + 1):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surefix.jit import kernel
+from surefix.robust.repeated_median import first_median
 from surefix.types import BoolArray, FloatArray
 
 __all__ = ["RECENT", "Replaced", "continued", "edited", "reduced", "smoothed"]
@@ -120,14 +121,20 @@ def _finite(x: FloatArray) -> FloatArray:
 @kernel
 def _continue(x: FloatArray, period: float, recent: FloatArray) -> FloatArray:
     """Lay each angle within half a turn of the median of ``recent``, which is kept up to date."""
-    turned = np.full(len(x), np.nan)
+    turned, known = np.full(len(x), np.nan), np.empty(RECENT)
     for k in range(len(x)):
         if np.isnan(x[k]):
             continue
         turned[k] = x[k]
-        if not np.isnan(recent[-1]):
-            reference = np.nanmedian(recent)
+        count = 0
+        for value in recent:
+            if not np.isnan(value):
+                known[count] = value
+                count += 1
+        if count > 0:
+            reference = first_median(known, count)
             turned[k] -= period * np.floor((x[k] - reference) / period + 0.5)
-        recent[:-1] = recent[1:].copy()
-        recent[-1] = turned[k]
+        for i in range(RECENT - 1):
+            recent[i] = recent[i + 1]
+        recent[RECENT - 1] = turned[k]
     return turned

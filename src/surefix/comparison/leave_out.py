@@ -40,6 +40,7 @@ _JUDGED: Final = (
     Reason.AXIS_OFF,
     Reason.JUMP,
     Reason.RUN,
+    Reason.DRAG,
 )
 
 

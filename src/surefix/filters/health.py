@@ -48,6 +48,8 @@ class Health(NamedTuple):
         (s,) whether the sensor fell and did not rise since.
     scale
         (s,) ratio of its noise to what was settled, as last told.
+    dragged
+        (s,) whether its last fix was in a drag.
     """
 
     seen: IntArray
@@ -57,6 +59,7 @@ class Health(NamedTuple):
     lean: FloatArray
     suspect: BoolArray
     scale: FloatArray
+    dragged: BoolArray
 
 
 def no_health(sensors: int) -> Health:
@@ -69,6 +72,7 @@ def no_health(sensors: int) -> Health:
         np.full((sensors, 3), np.nan),
         np.zeros(sensors, np.bool_),
         np.ones(sensors),
+        np.zeros(sensors, np.bool_),
     )
 
 

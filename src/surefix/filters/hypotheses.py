@@ -32,7 +32,7 @@ __all__ = [
     "no_hypotheses",
 ]
 
-MOST: Final = 64
+MOST: Final = 32
 """Hypotheses kept after each epoch."""
 
 MOST_SENSORS: Final = 62
@@ -163,6 +163,8 @@ class Bank(NamedTuple):
         (`MOST_SENSORS`,) factor of the variances of positions, as adapted.
     announced
         (1,) s, the beginning of the track as it was last told.
+    startled
+        (1,) s, when a velocity was last far from what the likeliest hypothesis expected.
     heard
         (`MOST_SENSORS`, 2·axes) s, when each sensor last observed each component.
     """
@@ -187,6 +189,7 @@ class Bank(NamedTuple):
     moved: FloatArray
     scale: FloatArray
     announced: FloatArray
+    startled: FloatArray
     heard: FloatArray
 
 
@@ -271,5 +274,6 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full(most, np.nan),
         np.ones(MOST_SENSORS),
         np.full(1, np.nan),
+        np.full(1, -np.inf),
         np.full((MOST_SENSORS, 2 * d), np.nan),
     )

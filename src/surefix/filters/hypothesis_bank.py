@@ -39,7 +39,7 @@ from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["apply_position", "best_of", "give_rows", "keep_best", "merge", "report"]
+__all__ = ["apply_position", "give_rows", "keep_best", "merge", "report"]
 
 _FAR = 10.0  # nats below the best at which a hypothesis is dropped
 _NOUGHT = -37.0  # nats: what is less likely than the best by that adds nothing to a sum
@@ -117,16 +117,6 @@ def give_rows(
     for i in range(free):
         place[count + i] = spare[i]
     bank.number[0] = count
-
-
-@inner
-def best_of(weight: FloatArray, count: int) -> int:
-    """Place of the greatest of the first ``count`` weights."""
-    best = 0
-    for k in range(1, count):
-        if weight[k] > weight[best]:
-            best = k
-    return best
 
 
 @inner

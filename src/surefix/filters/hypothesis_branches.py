@@ -22,7 +22,6 @@ from surefix.filters.hypotheses import (
     Bank,
     Prior,
 )
-from surefix.filters.hypothesis_axis import agility, reach
 from surefix.filters.hypothesis_density import (
     first_fix,
     log_normal,
@@ -38,6 +37,7 @@ from surefix.filters.hypothesis_drags import (
     outlasts,
     supposes,
 )
+from surefix.filters.hypothesis_manoeuvres import slipped, swift
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -48,7 +48,6 @@ __all__ = [
     "GROSS",
     "ROW",
     "position_branches",
-    "slipped",
     "velocity_branches",
 ]
 
@@ -61,7 +60,7 @@ CONFIRMED = 3
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
 _ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
-_SLIPPED = 1.5  # variance of a velocity beside what it was off by in the mean, in its own
+_STEPS = 40.0  # nats that a drag loses by a step of the velocities beside it
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
 _PREFERS = 3.0  # nats by which another sensor must prefer the offset, or not, to have a say
@@ -70,19 +69,6 @@ _AIDED = 5.0  # … or that many where velocities have supported it meanwhile
 _ANEW = 0.1  # … and how probable that is then
 _PI = math.pi
 _LOG_2PI = math.log(2.0 * math.pi)
-
-
-@inner
-def _since(touched: float, time: float) -> float:
-    """Seconds since an axis was last observed; 0 if it never was."""
-    return 0.0 if math.isnan(touched) else time - touched
-
-
-@inner
-def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
-    """Scale, squared, of component c of axis a if the highest rate changed ``gap`` seconds ago."""
-    change = agility(motion.density[a], gap) * reach(motion.order, c, gap)
-    return change * change + S
 
 
 @inner
@@ -130,9 +116,11 @@ def velocity_branches(
             seen += 1
         outside = wild_product(square, wide, seen)
         bad, good = rarely, mostly
-        leaning = False  # a drag beside velocities that are wrong, too, explains everything
+        # A drag beside velocities that are wrong, too, explains everything: none steps meanwhile.
+        leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
+        stepped = leaning and distance > _STRANGE
+        leaning = leaning and (bank.faulty[k] >> sensor) & 1 != 0
         if (bank.faulty[k] >> sensor) & 1:
-            leaning = bank.walks[k] != 0 and forced[d] != 0.0 and leans(prior, bank, k, time)
             bad, good = again, over
             alike = 0.0
             for a in range(d):
@@ -143,7 +131,7 @@ def velocity_branches(
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)
-            score[total] = base + inside + good
+            score[total] = base + inside + good - (_STEPS if stepped else 0.0)
             fair = poorer and math.isnan(forced[d])
             parent[total], code[total] = i, VELOCITY_POOR if fair else 0
             total += 1
@@ -153,49 +141,12 @@ def velocity_branches(
             total += 1
         strange = math.isnan(forced[d]) and distance > _STRANGE and bank.walks[k] == 0
         if strange and prior.manoeuvre > 0.0:
-            swift = _swift(motion, bank, k, 1, z[d:], variance[d:], time)
-            if not math.isnan(swift):
-                score[total] = base + swift + turned + good
+            turns = swift(motion, bank, k, 1, z[d:], variance[d:], time)
+            if not math.isnan(turns):
+                score[total] = base + turns + turned + good
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
     return total
-
-
-@inner
-def slipped(motion: Motion, bank: Bank, a: int, time: float, sensor: int, r: float) -> float:
-    """Variance of how a wrong velocity of axis a differs from what it was off by before.
-
-    What the track's own velocity is off by is the same in both, but for what it changed meanwhile.
-    """
-    gap = _since(bank.heard[sensor, motion.axes + a], time)
-    change = reach(motion.order, 1, gap)
-    return 2.0 * motion.density[a] * gap * change * change + _SLIPPED * r
-
-
-@lean_helper
-def _swift(
-    motion: Motion, bank: Bank, k: int, c: int, z: FloatArray, variance: FloatArray, time: float
-) -> float:
-    """Log-density of an observed component c after a manoeuvre; NaN where there is no time for one.
-
-    Component 0 is the position, 1 the velocity; ``z`` and ``variance`` (axes,) are those of it.
-    """
-    square = longest = 0.0
-    volume = 1.0
-    seen = 0
-    for a in range(motion.axes):
-        if math.isnan(z[a]):
-            continue
-        nu = z[a] - bank.mean[k, a, c]
-        if c == 0:
-            nu = wrapped(nu, motion.period)
-        gap = _since(bank.touched[k, a], time)
-        longest = max(longest, gap)
-        free = _freed(motion, a, c, gap, bank.covariance[k, a, c, c] + variance[a])
-        square += nu * nu / free
-        volume *= free
-        seen += 1
-    return wild_product(square, volume, seen) if longest > 0.0 else np.nan
 
 
 @inner
@@ -243,7 +194,7 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
-    drags = -1 if decided else supposes(prior, bank, place, sensor)
+    drags = -1 if decided else supposes(prior, bank, place, time, sensor)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]
@@ -328,7 +279,8 @@ def position_branches(
             parent[total], code[total] = i, says
             total += 1
         strange = stray > _STRANGE and own and not walks and prior.drag > 0.0
-        if strange and not unknown:
+        strange = strange and time - bank.startled[0] > prior.longest
+        if strange and not unknown and bank.length[k] >= CONFIRMED:
             dragged = dragged_axes(prior, bank, k, z, time, sensor)
             if dragged:
                 score[total] = base + outside + burst
@@ -341,9 +293,9 @@ def position_branches(
             total += 1
         strange = distance > _STRANGE and not unknown
         if strange and not own and prior.manoeuvre > 0.0:
-            swift = _swift(motion, bank, k, 0, z, variance, time)
-            if not math.isnan(swift):
-                score[total] = base + swift + turned
+            turns = swift(motion, bank, k, 0, z, variance, time)
+            if not math.isnan(turns):
+                score[total] = base + turns + turned
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1
         if own and not unknown and not walks:

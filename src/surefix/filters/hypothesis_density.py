@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from surefix.jit import inner
+from surefix.types import FloatArray
 
 __all__ = [
+    "best_of",
     "first_fix",
     "log_normal",
     "log_sum",
@@ -111,3 +113,13 @@ def first_fix(square: float) -> float:
     That is the density of a gross error of the usual size, ``square`` its scale squared.
     """
     return 2.0 * _PI * square
+
+
+@inner
+def best_of(weight: FloatArray, count: int) -> int:
+    """Place of the greatest of the first ``count`` weights."""
+    best = 0
+    for k in range(1, count):
+        if weight[k] > weight[best]:
+            best = k
+    return best

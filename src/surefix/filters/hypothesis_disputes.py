@@ -58,11 +58,9 @@ def _evidence(
     motion: Motion, prior: Prior, epochs: Epochs, out: BoolArray, rows: IntArray, weight: float
 ) -> float:
     """Log-likelihood of what was observed about some velocities if they have a weight, 0 or 1."""
-    near = epochs.time[rows[[0, -1]]] + [-prior.longest, prior.longest]
-    first, until = (
-        int(np.searchsorted(epochs.time, at, side))
-        for at, side in zip(near, ("left", "right"), strict=True)
-    )
+    time, apart = epochs.time, prior.longest
+    first = int(np.searchsorted(time, time[rows[0]] - apart))
+    until = int(np.searchsorted(time, time[rows[-1]] + apart, side="right"))
     fixed = epochs.fixed[first:until].copy()
     said = np.where(out[first:until], 0.0, 1.0)
     said[rows - first] = weight

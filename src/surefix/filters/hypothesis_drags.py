@@ -1,8 +1,9 @@
 """Kernels on drags: the fixes of a sensor wander off, beside others that do not.
 
 Nothing shows when a drag begins, so that it is supposed now and then that one does, and what is
-supposed is kept however improbable it is. In a drag the track is what velocities and other sensors say. What the fixes are
-off by is followed by itself, ``[b, c]`` with c its rate: neither says anything of the track.
+supposed is kept however improbable it is. In a drag the track is what velocities and other sensors
+say. What the fixes are off by is followed by itself, ``[b, c]`` with c its rate: neither says
+anything of the track.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 
 from surefix.filters.hypotheses import DROP, POOR, RESTARTS, WALK, Bank, Prior
-from surefix.filters.hypothesis_density import log_normal, wrapped
+from surefix.filters.hypothesis_density import best_of, log_normal, wrapped
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -26,6 +27,7 @@ __all__ = [
     "make_certain",
     "outlasts",
     "predict_drag",
+    "startles",
     "supposes",
 ]
 
@@ -37,9 +39,11 @@ _CLASSES = 3  # of ages
 _HOPELESS = 50.0  # nats below the best, where a drag is given up
 _BENDS = 0.05  # probability that the rate of a drag is another from one fix to the next
 _FAR_OFF = 16.0  # squared distance from which an offset is no noise
+_STARTLES = 25.0  # … and from which a velocity has stepped
 _SKEW = 0.02  # share of the speed that a velocity may be wrong by for good: a degree of heading
 _LONGEST = 300.0  # s, and …
-_RUNS = 5.0  # … longest runs, and times the age of the track: what lasts longer is no drag
+_RUNS = 8.0  # … longest runs: what lasts longer is no drag, …
+_AGES = 5.0  # … nor what lasts so many times as long as the track before it
 
 
 @inner
@@ -67,7 +71,8 @@ def predict_drag(
 @inner
 def _rate(prior: Prior, a: int) -> float:
     """Scale of the rates of drags: they reach the size of gross errors in a longest run."""
-    return prior.spread[a] / prior.longest
+    size: float = prior.spread[a]
+    return size / prior.longest
 
 
 @inner
@@ -101,32 +106,46 @@ def leans(prior: Prior, bank: Bank, k: int, time: float) -> bool:
     return False
 
 
+@inner
+def startles(motion: Motion, standardised: FloatArray) -> bool:
+    """Whether a velocity is far from what the likeliest hypothesis expects."""
+    total = 0.0
+    for a in range(motion.axes):
+        off = standardised[motion.axes + a]
+        total += 0.0 if math.isnan(off) else off * off
+    return total > _STARTLES
+
+
 @lean_helper
-def supposes(prior: Prior, bank: Bank, place: IntArray, sensor: int) -> int:
-    """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1."""
-    if not prior.drag > 0.0 or len(place) < _PACE:
+def supposes(prior: Prior, bank: Bank, place: IntArray, time: float, sensor: int) -> int:
+    """Which hypothesis it is supposed of that a drag of a sensor begins, by its place; or −1.
+
+    None is after velocities that stepped: they may be wrong, and the fixes right.
+    """
+    calm = time - bank.startled[0] > prior.longest
+    if not prior.drag > 0.0 or len(place) < _PACE or not calm:
         return -1
-    first = -1
     for i in range(bank.number[0]):
         k = place[i]
         if bank.walks[k] and bank.run[k] == sensor and bank.length[k] < _PACE:
             return -1
-        if first < 0 and bank.run[k] < 0 and bank.faulty[k] == 0:
-            first = i
-    return first
+    best = best_of(bank.weight, bank.number[0])
+    return best if bank.run[place[best]] < 0 and bank.faulty[place[best]] == 0 else -1
 
 
 @lean_helper
 def outlasts(prior: Prior, bank: Bank, k: int, time: float) -> bool:
     """Whether a drag has lasted longer than any may."""
     longest = max(_RUNS * prior.longest, _LONGEST)
-    return time - bank.opened[k] >= min(longest, _RUNS * (bank.opened[k] - bank.began[k]))
+    lasted: float = time - bank.opened[k]
+    age: float = bank.opened[k] - bank.began[k]
+    return lasted >= min(longest, _AGES * age)
 
 
 @inner
 def _bend(prior: Prior, bank: Bank, k: int, a: int, time: float) -> float:
-    """How far the offset may be off, squared, if its rate changed about the last fix of the drag."""
-    far = 2.0 * _rate(prior, a) * (time - bank.drift[k, a, 3])
+    """How far, squared, the offset may be off if its rate changed about the last fix."""
+    far: float = 2.0 * _rate(prior, a) * (time - bank.drift[k, a, 3])
     return far * far
 
 
@@ -230,8 +249,8 @@ def make_certain(prior: Prior, bank: Bank, k: int, b: int, time: float) -> None:
 def _uncertain(bank: Bank, k: int, code: int) -> bool:
     """Whether a candidate comes from a drag, or begins one, that may be none."""
     if bank.walks[k]:
-        return bank.walks[k] & CERTAIN == 0
-    return code & WALK != 0 and bank.run[k] < 0
+        return int(bank.walks[k]) & CERTAIN == 0
+    return code & WALK != 0 and int(bank.run[k]) < 0
 
 
 @inner

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from surefix.filters.hypotheses import Bank, Found, Prior
-from surefix.filters.hypothesis_bank import best_of
-from surefix.filters.hypothesis_density import wrapped
+from surefix.filters.hypothesis_density import best_of, wrapped
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray

@@ -42,7 +42,6 @@ from surefix.filters.hypothesis_axis import (
 )
 from surefix.filters.hypothesis_bank import (
     apply_position,
-    best_of,
     give_rows,
     keep_best,
     merge,
@@ -50,12 +49,12 @@ from surefix.filters.hypothesis_bank import (
 )
 from surefix.filters.hypothesis_branches import (
     CONFIRMED,
-    GROSS,
     position_branches,
-    slipped,
     velocity_branches,
 )
-from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag
+from surefix.filters.hypothesis_density import best_of
+from surefix.filters.hypothesis_drags import cap_drags, keep_drags, predict_drag, startles
+from surefix.filters.hypothesis_manoeuvres import learn_slip
 from surefix.filters.hypothesis_noise import adapt, innovate
 from surefix.filters.hypothesis_scratch import Scratch, rows_of, scratch_for
 from surefix.filters.records import Epochs, Motion
@@ -65,8 +64,8 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["filter_hypotheses"]
 
-_LEARNS = 0.5  # of how much a velocity is off by a further one that is off alike
-_BY_ROW = tuple(set(Bank._fields) - {"time", "number", "weight", "scale", "announced", "heard"})
+_WHOLE = {"time", "number", "weight", "scale", "announced", "startled", "heard"}
+_BY_ROW = tuple(set(Bank._fields) - _WHOLE)
 
 
 @inner
@@ -83,16 +82,7 @@ def _apply_velocity(
     """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
     if code & VELOCITY_OUT:
-        distance = 0.0
-        for a in range(d):
-            if not math.isnan(z[d + a]):
-                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
-                distance += off * off / slipped(motion, bank, a, time, sensor, r[d + a])
-        alike = bank.faulty[i] & bit and distance < GROSS
-        for a in range(d):
-            if not math.isnan(z[d + a]):
-                off = z[d + a] - bank.mean[i, a, 1] - bank.slip[i, a]
-                bank.slip[i, a] += _LEARNS * off if alike else off
+        learn_slip(motion, bank, i, z, r, time, sensor)
         bank.faulty[i] |= bit
         return
     bank.faulty[i] &= ~bit
@@ -252,6 +242,8 @@ def _run(
                         drift = bank.drift[place[i], a]
                         predict_drag(m, P, drift, motion.order, dt, prior.longest)
         innovate(motion, bank, place, k, z, r, found, work.noise)
+        if moved and startles(motion, found.standardised[k]):
+            bank.startled[0] = time
         for stage in range(2):
             if stage == 0 and moved:
                 total = velocity_branches(

@@ -175,7 +175,7 @@ def decide_offline(
     recovery, n = _steady(prior), len(epochs.time)
     ahead, evidence = _decided(motion, prior, epochs)
     turned, reverse = _decided(motion, prior, backward(motion, epochs))
-    back = Decisions(*(field[::-1] for field in turned))
+    back = Decisions(turned.fixed[::-1], turned.jump[::-1], turned.run[::-1])
     jump = _in_both(epochs.time, ahead.jump, back.jump, prior.longest)
     ahead, back = _settled(epochs.time, ahead, back, evidence - reverse[::-1], prior.longest)
     d = motion.axes

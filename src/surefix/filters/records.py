@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.types import FloatArray, IntArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["Epochs", "Estimate", "Filtered", "Motion", "Recovery", "TrackState"]
 

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypothesis_bank import best_of, keep_best
-from surefix.filters.hypothesis_density import log_normal, log_sum, log_wild
+from surefix.filters.hypothesis_bank import keep_best
+from surefix.filters.hypothesis_density import best_of, log_normal, log_sum, log_wild
 from surefix.filters.sight_fit import finish, fit, innovation, prepare
 from surefix.filters.sight_records import (
     MATURE_SIGHTS,

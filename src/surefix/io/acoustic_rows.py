@@ -59,6 +59,14 @@ class Sightings:
         """Sightings of the target so far, those that wait included."""
         return self._count + len(self) + len(self._waiting)
 
+    def waiting(self) -> list[tuple[str, int, float, bool]]:
+        """Give those that are not ready: target, number, time, whether there is a position."""
+        first = self._count + len(self)
+        return [
+            (each.target, first + k, time, each.valid)
+            for k, (each, time) in enumerate(self._waiting)
+        ]
+
     def copy(self) -> Sightings:
         """One that goes on by itself from here."""
         other = copy.copy(self)

@@ -111,6 +111,11 @@ class Journal:
     def __init__(self, place: Place) -> None:
         self._place = place
 
+    @property
+    def aside(self) -> str:
+        """Name of a damaged file that was put aside when it was opened, if there was one."""
+        return self._place.aside
+
     def write(
         self,
         received: Sequence[Received] = (),

@@ -82,6 +82,8 @@ class Place:
 
     def __init__(self, engine: Engine, lock: Connection | None = None) -> None:
         self._engine, self._lock = engine, lock
+        self.aside = ""
+        """Name of a damaged file that was put aside, if there was one."""
         self._served = engine.dialect.name == "postgresql"
         self._writer: Connection | None = None
         self._start = 0
@@ -279,6 +281,7 @@ def _file(url: URL, *, new: bool) -> Place:
         if "locked" in said(error):
             raise _another(str(file)) from error
         raise OutputError(f"{file}: {said(error)}", "a file that can be written") from error
+    aside = ""
     if file.exists() and not _sound(file):
         aside = f"{file.name}.damaged-{time.strftime('%Y%m%dT%H%M%S')}"
         for part in ("", "-wal", "-shm"):
@@ -286,7 +289,9 @@ def _file(url: URL, *, new: bool) -> Place:
                 old.rename(file.with_name(aside + part))
     engine = create_engine(url)
     event.listen(engine, "connect", _durable)
-    return Place(engine, lock)
+    place = Place(engine, lock)
+    place.aside = aside
+    return place
 
 
 def _durable(connection: Any, _record: object) -> None:

@@ -72,8 +72,10 @@ def decimal(data: ByteArray, a: int, b: int, signed: bool) -> float:
 
 @helper
 def letter(data: ByteArray, a: int, b: int) -> int:
-    """The only byte of a field; 0 where it is empty, 255 where there are more."""
-    return 0 if a == b else int(np.int64(data[a])) if b - a == 1 else 255
+    """The only byte of a field; 0 where it is empty, 255 where there are more, or it is NUL."""
+    if a == b:
+        return 0
+    return int(np.int64(data[a])) if b - a == 1 and data[a] != 0 else 255
 
 
 @helper

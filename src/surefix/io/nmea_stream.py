@@ -15,7 +15,7 @@ from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
 from surefix.io.acoustic_rows import Sightings
 from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
-from surefix.io.nmea_epoch import Epochs, source
+from surefix.io.nmea_epoch import Epochs
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
 from surefix.io.nmea_lines import Plain
 from surefix.io.nmea_record import (
@@ -39,7 +39,7 @@ __all__ = ["NmeaStream"]
 
 _UNDATED = 500  # rows of a stream that wait for the first date
 _STATE = (
-    "_framing", "_clock", "_epochs", "_devices", "_channels", "_delays", "_counts",
+    "_framing", "_clock", "_epochs", "_devices", "_channels", "_counts",
     "_problems", "_reported", "_line", "_led",
 )  # fmt: skip
 _SAMPLES_PER_FIX = 10  # a chunk also ends after so many channel samples per fix it may hold
@@ -65,13 +65,12 @@ class NmeaStream:
         self._path = path
         self._framing = START
         self._arrival = math.nan
-        self._live = False  # whether it comes in pieces, and not from a file
         self._require_checksum = require_checksum
         self._clock = LogClock()
         self._epochs = Epochs() if plan is None or plan == SHIP else Sightings(plan)
         self._led = math.nan  # time that a device has given to the log
         self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
-        self._channels, self._delays = Series(), Series()
+        self._channels = Series()
         self._counts: dict[str, int] = {}
         self._problems: dict[ProblemKind, tuple[int, str]] = {}
         self._coming: Iterator[Frame | tuple[int, float, Record]] = iter(())
@@ -116,7 +115,6 @@ class NmeaStream:
                 "_epochs": self._epochs.copy(),
                 "_devices": {name: copy.copy(clock) for name, clock in self._devices.items()},
                 "_channels": self._channels.copy(),
-                "_delays": self._delays.copy(),
                 "_counts": {**self._counts},
                 "_problems": {**self._problems},
                 "_reported": {*self._reported},
@@ -150,6 +148,14 @@ class NmeaStream:
             return []
         return [(f"{self._path.stem} {name}", n, t, ok) for name, n, t, ok in self._epochs.begun()]
 
+    @property
+    def waiting(self) -> list[tuple[str, int, float, bool]]:
+        """Sightings that wait until the ship's position at their time is known; as `begun`."""
+        if self._sightings is None:
+            return []
+        told = self._sightings.waiting()
+        return [(f"{self._path.stem} {name}", n, t, ok) for name, n, t, ok in told]
+
     def read(self, data: bytes, arrival: float = math.nan) -> Log:
         """Read the next piece and give the rows that are complete.
 
@@ -162,7 +168,7 @@ class NmeaStream:
         arrival
             s, Unix, when it arrived; it is the time of reception of lines that do not say one.
         """
-        self._arrival, self._live = arrival, True
+        self._arrival = arrival
         self._framing, frames = frame(self._framing, data)
         self._read(frames)
         received = not math.isnan(self._clock.receive)
@@ -249,11 +255,9 @@ class NmeaStream:
             problems=tuple(self._told()),
             events=tuple(self._events()),
             counts=self._counts,
-            delays=tuple(self._delays.told(self._path.stem)),
             depth_positive_down=self._sightings is not None,
         )
-        self._channels, self._delays = Series(), Series()
-        self._problems, self._counts = {}, {}
+        self._channels, self._problems, self._counts = Series(), {}, {}
         self._clock.settle()
         return log
 
@@ -306,15 +310,9 @@ class NmeaStream:
             self._clock.shift = 0.0
         return time
 
-    def _delay(self, sensor: str, time: float) -> None:
-        """Note how long after its validity an observation was received."""
-        if self._live and not math.isnan(self._clock.receive - time):
-            self._delays.add("delay_s", sensor, self._clock.receive, self._clock.receive - time)
-
     def _position(self, record: Position) -> None:
         time = self._instant(record.second, record.day)
         self._epochs.add(record, time, self._clock.receive)
-        self._delay(source(record.talker), time)
         if record.type == "RMC":
             sensor = record.talker + "RMC"
             self._channels.add("speed_mps", sensor, time, record.speed)
@@ -330,7 +328,6 @@ class NmeaStream:
             time = self._instant(record.second, record.day)
         else:
             time = self._device(record.type, record.measured, record.told)
-        self._delay(record.target, time)
         return None if self._sightings is None else self._sightings.see(record, time)
 
     def _attitude(self, record: Attitude) -> None:
@@ -341,7 +338,6 @@ class NmeaStream:
 
     def _body_velocity(self, record: BodyVelocity) -> None:
         time = self._device(record.type, record.measured, record.told)
-        self._delay(record.type, time)
         self._channels.add("forward_mps", record.type, time, record.forward)
         self._channels.add("starboard_mps", record.type, time, record.starboard)
         self._channels.add("down_mps", record.type, time, record.down)

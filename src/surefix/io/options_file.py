@@ -27,7 +27,12 @@ __all__ = ["OptionsFile", "read_options"]
 _TABLES = ("clean", "columns", "sensor")
 # Of surefix live, whose file holds for surefix clean too:
 _LIVE = ("alarms", "input", "journal", "output", "web")
-_SENSOR_KEYS = ("delay_s", "sigma")
+_SENSOR_KEYS = ("delay_s", "lever_arm", "sigma")
+_BY_SENSOR = (
+    ("sigma", "sensor_sigma"),
+    ("delay_s", "sensor_delay_s"),
+    ("lever_arm", "lever_arm"),
+)
 
 
 class OptionsFile(NamedTuple):
@@ -63,12 +68,16 @@ def read_options(path: str | Path) -> OptionsFile:
     clean = dict(content.get("clean", {}))
     for name, figures in content.get("sensor", {}).items():
         _add_sensor(place, name, figures, clean)
+    for table in content.get("input", []):
+        if isinstance(table, dict) and "lever_arm" in table and "name" in table:
+            arms = {**clean.get("lever_arm", {}), str(table["name"]): table["lever_arm"]}
+            clean["lever_arm"] = arms
     return OptionsFile(clean, columns)
 
 
 def _add_sensor(place: Path, name: str, figures: Any, clean: dict[str, Any]) -> None:
     if not isinstance(figures, dict) or set(figures) - set(_SENSOR_KEYS):
         raise OptionsError(f"{place}: [sensor.{name}]", "the keys " + ", ".join(_SENSOR_KEYS))
-    for key, option in (("sigma", "sensor_sigma"), ("delay_s", "sensor_delay_s")):
+    for key, option in _BY_SENSOR:
         if key in figures:
             clean[option] = {**clean.get(option, {}), name: figures[key]}

@@ -66,7 +66,7 @@ def sensor_events(
     supporting: BoolArray,
     health: Health | None,
 ) -> tuple[list[Event], Health]:
-    """Sensors that are mostly rejected or noisier than was settled, and those that recover.
+    """Sensors that wander off, are mostly rejected or noisier than settled, and that recover.
 
     Parameters
     ----------
@@ -106,7 +106,25 @@ def sensor_events(
         elif not supporting[rows[i]]:
             text = f"the noise of {name} is {figure[i]:.2g} × what was settled"
             events.append(Event("noise-changed", at, text))
+    for k in rows[_begin_to_drag(health, judged, sensor, rows)].tolist():
+        text = (
+            f"fixes of {sensors[sensor[k]]} wander off, by {vector(judged.offset[k].tolist())} now"
+        )
+        events.append(Event("drag", float(time[k]), text))
     return events, health
+
+
+def _begin_to_drag(health: Health, judged: Verdicts, sensor: IntArray, rows: IntArray) -> BoolArray:
+    """Which of some rows are the first fix of a drag; what ``health`` knows of it is brought on."""
+    dragged = judged.reason[rows] == Reason.DRAG
+    told = dragged | (judged.verdict[rows] != Verdict.REJECTED)  # another error ends no drag
+    first = np.zeros(len(rows), np.bool_)
+    for own in np.unique(sensor[rows]).tolist():
+        mine = np.flatnonzero((sensor[rows] == own) & told)
+        before = np.append(health.dragged[own], dragged[mine])
+        first[mine] = dragged[mine] & ~before[:-1]
+        health.dragged[own] = before[-1]
+    return first
 
 
 def _widened(health: Health | None, sensors: int) -> Health:

@@ -165,7 +165,7 @@ def verdicts(
         reason[part] = Reason.AXIS_OFF
         detail[part] = (low[part] * _bits(axes, apart)).sum(axis=1)
     run = (found.run > 1) & (verdict == Verdict.REJECTED)
-    reason[run], detail[run] = Reason.RUN, found.run[run]
+    reason[run], detail[run] = np.where(found.drag, Reason.DRAG, Reason.RUN)[run], found.run[run]
     since = found.since[:, :groups]
     jumped = np.isfinite(since).any(axis=1)
     reason[jumped & (verdict != Verdict.REJECTED)] = Reason.JUMP
@@ -182,7 +182,7 @@ def verdicts(
         found.standardised[:, :d],
         reason.astype(np.int64),
         detail,
-        np.where((reason == Reason.RUN)[:, None], found.offset, np.nan),
+        np.where(np.isin(reason, (Reason.RUN, Reason.DRAG))[:, None], found.offset, np.nan),
     )
 
 

@@ -23,6 +23,7 @@ from surefix.pipelines.rows import (
     take_fixes,
     take_rows,
 )
+from surefix.pipelines.turning import Arm, Turning, arms_at, reached, turned
 from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
 
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
@@ -44,6 +45,7 @@ class Chunk(NamedTuple):
 class _Inflow(NamedTuple):
     """Where one input stands: its clock, rows held back by it, and rows in order."""
 
+    name: str
     role: str
     clock: ClockState = ClockState()
     held: Fixes | None = None
@@ -66,12 +68,18 @@ class Merging(NamedTuple):
         s that an input may be behind the others before they wait for it no longer.
     released
         Time up to which rows were let go, s.
+    arms
+        Where the antenna of each sensor is.
+    turning
+        The headings, where an antenna has a lever arm.
     """
 
     inflows: tuple[_Inflow, ...]
     sensors: tuple[str, ...] = ()
     patience: float = np.inf
     released: float = -np.inf
+    arms: tuple[Arm, ...] = ()
+    turning: Turning = Turning()
 
     @property
     def ended(self) -> bool:
@@ -85,14 +93,15 @@ class Merging(NamedTuple):
         return min(there, key=lambda i: self.inflows[i].last_tau)
 
 
-def begin_merging(roles: Sequence[str], patience: float = np.inf) -> Merging:
-    """Begin to merge inputs of the given roles.
+def begin_merging(inputs: Sequence[tuple[str, str]], patience: float = np.inf) -> Merging:
+    """Begin to merge inputs of the given names and roles.
 
-    ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or ``heading``, a
-    series that is only cleaned. An input that is more than ``patience`` seconds behind is waited
-    for no longer; what it brings from before the rows that were let go is late.
+    A role is ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or
+    ``heading``, a series that is only cleaned, and carries the lever arms. An input that is more
+    than ``patience`` seconds behind is waited for no longer; what it brings from before the rows
+    that were let go is late.
     """
-    return Merging(tuple(_Inflow(role) for role in roles), patience=patience)
+    return Merging(tuple(_Inflow(name, role) for name, role in inputs), patience=patience)
 
 
 def merge(
@@ -118,11 +127,15 @@ def merge(
         delay = options.sensor_delay_s
         names = log.sensors if inflow.role != "depth" else _depth_sensors(log)
         numbers = np.array([_number(sensors, name) for name in names] or [0])
+        arms = (*merging.arms, *_arms(sensors[len(merging.arms) :], inflow.name, options))
+        merging = merging._replace(arms=arms)
         delays = np.array([delay.get(name, 0.0) for name in names] or [0.0])
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
     inflow, events = _order(inflow, fixes, options.reorder_s)
-    if log is not None and inflow.role == "heading":
+    if log is not None and options.lever_arm:
+        inflow, merging = _turn(inflow, merging, log)
+    elif log is not None and inflow.role == "heading":
         inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     inflows = [*merging.inflows]
     inflows[source] = inflow
@@ -133,6 +146,8 @@ def merge(
             inflows[i], more = _order(each, None, options.reorder_s, least)
             events = (*events, *more)
     inflows, rows, released = _release(inflows, merging, least)
+    if rows is not None and options.lever_arm:
+        rows = _with_arms(rows, merging, options)
     after = merging._replace(inflows=tuple(inflows), sensors=tuple(sensors), released=released)
     if log is None:
         return after, Chunk(rows, (), events, (), False)
@@ -173,6 +188,32 @@ def _supporting(log: Log, role: str) -> Fixes | None:
     )
 
 
+def _arms(fresh: list[str], name: str, options: CleanOptions) -> list[Arm]:
+    """Where the antennas of new sensors of an input are: named by sensor, or by input."""
+    given = options.lever_arm
+    return [tuple(given.get(each, given.get(name, ()))) for each in fresh]
+
+
+def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging]:
+    """Take the headings of an input for that; without one of that role those beside the fixes."""
+    roles = {each.role for each in merging.inflows}
+    if inflow.role != ("heading" if "heading" in roles else "fixes"):
+        return inflow, merging
+    turning = turned(merging.turning, log.channels, merging.released)
+    if inflow.role == "heading":
+        inflow = inflow._replace(last_tau=max(inflow.last_tau, reached(turning)))
+    return inflow, merging._replace(turning=turning)
+
+
+def _with_arms(rows: Rows, merging: Merging, options: CleanOptions) -> Rows:
+    arms = np.zeros((max(len(merging.arms), 1), 3))
+    for k, arm in enumerate(merging.arms):
+        arms[k] = arm or 0.0
+    sigma = np.radians(options.sigma_heading_deg)
+    own = arms[rows.fixes.sensor]
+    return rows._replace(lever=arms_at(merging.turning, rows.fixes.time, own, sigma))
+
+
 def _depths(log: Log) -> list[Channel]:
     return [channel for channel in log.channels if channel.name == "depth_m"]
 
@@ -199,7 +240,8 @@ def _order(
         if len(repaired.order):
             auxiliary = np.full(len(repaired.order), inflow.role != "fixes")
             ordered = take_fixes(both, repaired.order)
-            rows = Rows(ordered, repaired.tau, repaired.time, repaired.late, auxiliary)
+            blank = np.empty((len(auxiliary), 0))
+            rows = Rows(ordered, repaired.tau, repaired.time, repaired.late, auxiliary, blank)
             latest = float(np.nanmax(repaired.tau, initial=-np.inf))
             inflow = inflow._replace(
                 ready=(*inflow.ready, rows), last_tau=max(inflow.last_tau, latest)

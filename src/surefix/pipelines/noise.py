@@ -10,6 +10,7 @@ from surefix.cleaning.duplicates import constant_axes
 from surefix.filters.hypotheses import MOST_SENSORS, Prior
 from surefix.filters.learning import learn, likelihood
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain
+from surefix.io.nmea_sentence import KMH, KNOT
 from surefix.models.motion import MODELS
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
@@ -19,6 +20,9 @@ __all__ = ["Figures", "settle_noise"]
 
 _MEMORY = 300.0  # observations by which noise is adapted in real time
 _LOOKED_AT = 50_000  # rows whose digits are looked at
+_SPEEDS = tuple(unit * digit for unit in (1.0, KNOT, KMH) for digit in (0.1, 0.01, 0.001))
+_COURSES = tuple(float(np.radians(digit)) for digit in (1.0, 0.1, 0.01))
+_FITS = 1e-6  # of a step, within which a value is a multiple of it
 _PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
 
 
@@ -119,6 +123,7 @@ def _blocks(
 ) -> list[_Block]:
     """Figures of the horizontal and of the vertical axes under one motion model."""
     out = []
+    recorded = np.where(np.isfinite(velocity), rows.fixes.velocity, np.nan)  # in its own axes
     for vertical in (False, True):
         block = [i for i in axes if (i == 2) == vertical]
         if not block:
@@ -133,7 +138,7 @@ def _blocks(
             rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]
         )
         given = _given(options, sensors, rows, vertical)
-        quantum = _quantum(rows, block), _velocity_quantum(velocity, block)
+        quantum = _quantum(rows, block), _velocity_quantum(recorded, block)
         found = estimate_noise(
             observations,
             given,
@@ -264,17 +269,28 @@ def _quantum(rows: Rows, block: list[int]) -> float:
 
 
 def _velocity_quantum(velocity: FloatArray, block: list[int]) -> float:
-    """Resolution of the velocities along a block, m/s; horizontal ones may be speed and course."""
-    if len(block) < 2:
-        return grain(velocity[:_LOOKED_AT, block[0]])
-    east, north = velocity[:_LOOKED_AT, 0], velocity[:_LOOKED_AT, 1]
-    speed, course = np.hypot(east, north), np.arctan2(east, north)
-    moving = speed[speed > 0.0]
-    usual = float(np.median(moving)) if len(moving) else 0.0
-    return max(
-        grain(np.round(speed, 6).astype(np.float64)),
-        usual * grain(np.round(course[speed > 0.0], 6).astype(np.float64)),
-    )
+    """Resolution of recorded velocities along a block, m/s; horizontal ones may be speed, course.
+
+    They may also never change: then it is what their digits tell.
+    """
+    seen = velocity[:_LOOKED_AT, block]
+    steps = [_step(column, _SPEEDS) for column in seen.T]
+    if len(block) == 2:
+        speed, course = np.hypot(*seen.T), np.arctan2(*seen.T)
+        moving = speed > 0.0
+        usual = float(np.median(speed[moving])) if moving.any() else 0.0
+        steps += [_step(speed, _SPEEDS), usual * _step(course[moving], _COURSES)]
+    return max(steps)
+
+
+def _step(values: FloatArray, usual: tuple[float, ...]) -> float:
+    """Resolution of a series; if only a few values occur the coarsest usual one that they fit."""
+    found = grain(np.round(values, 6).astype(np.float64))
+    known = np.unique(values[np.isfinite(values)])
+    if found > 0.0 or not len(known):
+        return found
+    fit = (step for step in usual if (np.abs(known / step - np.rint(known / step)) < _FITS).all())
+    return max(fit, default=0.0)
 
 
 def _named(block: _Block, sensors: list[str], model: str) -> list[Noise]:

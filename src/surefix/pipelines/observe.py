@@ -112,6 +112,8 @@ def epochs_of(
             for own, figures in zip(declared, (setup.position, setup.velocity), strict=True)
         ]
     )
+    if rows.lever.shape[1]:
+        sigma[:, : len(axes)] = np.hypot(sigma[:, : len(axes)], rows.lever[:, 6:][:, axes])
     z[status.verdict >= 0] = np.nan
     fixed = np.full((n, motion.groups), np.nan)
     positions = int(motion.group[: len(axes)].max(initial=-1)) + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, Literal, get_args
@@ -62,6 +62,11 @@ class CleanOptions:
         depths or velocities. Wins over the three above.
     sensor_delay_s
         How much too late a sensor's times are, s, by name; subtracted.
+    lever_arm
+        Where antennas are, by name of a sensor or of an input: forward, starboard and up from the
+        reference point, m. Positions are those of the reference point then. It takes headings.
+    sigma_heading_deg
+        Standard deviation of the heading that carries lever arms, deg.
     process
         Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
     every_s
@@ -92,6 +97,8 @@ class CleanOptions:
     sigma_velocity: float | None = None
     sensor_sigma: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     sensor_delay_s: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    lever_arm: Mapping[str, Sequence[float]] = field(default_factory=lambda: MappingProxyType({}))
+    sigma_heading_deg: float = 1.0
     process: float | None = None
     every_s: float | None = None
     reorder_s: float = 10.0
@@ -119,6 +126,17 @@ class CleanOptions:
             _positive(f"sigma of sensor {sensor!r}", value)
         for sensor, value in self.sensor_delay_s.items():
             _number(f"delay of sensor {sensor!r}", value)
+        if not isinstance(self.lever_arm, Mapping):
+            raise OptionsError(
+                f"lever_arm = {self.lever_arm!r}", "[forward, starboard, up] by name"
+            )
+        for sensor, arm in self.lever_arm.items():
+            if not isinstance(arm, list | tuple) or len(arm) != 3:
+                raise OptionsError(
+                    f"lever arm {arm!r} of {sensor!r}", "[forward, starboard, up], m"
+                )
+            for value in arm:
+                _number(f"lever arm of {sensor!r}", value)
         for name in ("k0", "k1"):
             if getattr(self, name) is not None:
                 _number(name, getattr(self, name))
@@ -206,6 +224,7 @@ _POSITIVE = (
     "sigma_position",
     "sigma_height",
     "sigma_velocity",
+    "sigma_heading_deg",
     "process",
     "every_s",
 )

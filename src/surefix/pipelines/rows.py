@@ -34,6 +34,8 @@ class Rows(NamedTuple):
         (n,) arrived too late to be put in its place.
     auxiliary
         (n,) True for rows of another sensor, which have no row of their own in the output.
+    lever
+        (n, 9) as `surefix.pipelines.turning.arms_at`; (n, 0) where no sensor has a lever arm.
     """
 
     fixes: Fixes
@@ -41,6 +43,7 @@ class Rows(NamedTuple):
     time: FloatArray
     late: BoolArray
     auxiliary: BoolArray
+    lever: FloatArray
 
 
 def take_rows(rows: Rows, index: IntArray | BoolArray | slice) -> Rows:
@@ -51,6 +54,7 @@ def take_rows(rows: Rows, index: IntArray | BoolArray | slice) -> Rows:
         rows.time[index],
         rows.late[index],
         rows.auxiliary[index],
+        rows.lever[index],
     )
 
 

@@ -23,6 +23,7 @@ from surefix.types import Channel, Cleaned, CleanedChannel, Event, Log
 
 __all__ = ["advance", "begin_session", "end_on_trial"]
 
+_SEVERAL, _SPAN = 20, 1.0  # values of a series, or s that they span, before they are taken on
 _PORTION = 50_000  # rows cleaned at a time in real time; or as many as it is settled on
 
 
@@ -46,8 +47,8 @@ def begin_session(
     live
         Whether an input may fall silent: one that is ``reorder_s`` behind is waited for no longer.
     """
-    names, roles = [name for name, _ in inputs], [role for _, role in inputs]
-    merging = begin_merging(roles, options.reorder_s if live else np.inf)
+    names = [name for name, _ in inputs]
+    merging = begin_merging(inputs, options.reorder_s if live else np.inf)
     return Session(options=options, names=tuple(names), merging=merging, estimator=estimator)
 
 
@@ -113,7 +114,8 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Session, tuple[
             if not merging.inflows[source].ended:
                 merging, chunk = merge(merging, source, part, session.options)
                 waiting.append(chunk)
-    session = replace(session, merging=merging, waiting=(), arrived={})
+    begun = {key: parts for key, parts in session.arrived.items() if key in session.channels}
+    session = replace(session, merging=merging, waiting=(), arrived=begun)
     return _batches(session, waiting, final=True, begins=False)
 
 
@@ -182,12 +184,19 @@ def _enough(series: Channel, options: CleanOptions) -> bool:
     return len(ordered) >= 2 * head and int(ordered.sum()) >= head
 
 
+def _worth_while(parts: Sequence[Channel]) -> bool:
+    """Whether what has come of a series that is begun is taken on: not value by value."""
+    times = [part.time for part in parts if len(part.time)]
+    several = sum(map(len, times)) >= _SEVERAL
+    return several or (len(times) > 0 and bool(times[-1][-1] - times[0][0] >= _SPAN))
+
+
 def _clean_channels(
     session: Session, chunks: Sequence[Chunk], *, final: bool, begins: bool
 ) -> tuple[Session, tuple[CleanedChannel, ...]]:
     """Clean the series of a batch; one that just begins waits until there is enough to settle.
 
-    Without ``begins`` it waits in any case.
+    Without ``begins`` it waits in any case. One that is begun waits for some more values.
     """
     states, arrived = {**session.channels}, {**session.arrived}
     for chunk in chunks:
@@ -199,6 +208,8 @@ def _clean_channels(
     for key in [*arrived, *late]:
         state = states.get(key, ChannelState())
         parts: tuple[Channel, ...] = arrived.get(key) or (state.nothing(),)
+        if key in states and not final and not _worth_while(parts):
+            continue
         whole = parts[0]._replace(
             time=np.concatenate([part.time for part in parts]),
             value=np.concatenate([part.value for part in parts]),

@@ -62,6 +62,7 @@ def settle_session(
     options, head = session.options, _head(session.options)
     rows, usable = take_rows(rows, head), usable[head]
     unknown = sorted({*options.sensor_sigma, *options.sensor_delay_s} - {*session.sensors})
+    unknown += sorted({*options.lever_arm} - {*session.sensors, *session.names})
     if unknown:
         known = ", ".join(session.sensors)
         raise OptionsError(f"options for sensor {unknown[0]!r}", f"one of {known}")

@@ -77,13 +77,19 @@ class Setup:
 def localise(
     rows: Rows, frame: LocalFrame | None, origin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Position (n, 3) and velocity (n, 3) of rows in the local axes."""
+    """Position (n, 3) and velocity (n, 3) of rows in the local axes, at the reference point."""
     position, velocity = rows.fixes.position - origin, rows.fixes.velocity.copy()
+    arm = rows.lever.copy()
     if frame is not None and rows.fixes.geographic:
         x, y, convergence = frame.to_local(rows.fixes.position[:, 0], rows.fixes.position[:, 1])
         position[:, 0], position[:, 1] = x, y
         turn = np.nan_to_num(convergence)
         velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], turn)
+        for k in (0, 3) if arm.shape[1] else ():
+            arm[:, k], arm[:, k + 1] = rotate(arm[:, k], arm[:, k + 1], turn)
+    if arm.shape[1]:
+        position -= arm[:, :3]
+        velocity -= arm[:, 3:6]
     return np.clip(position, -FARTHEST, FARTHEST), np.clip(velocity, -FARTHEST, FARTHEST)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from surefix.jit import helper, kernel
 from surefix.types import FloatArray
 
-__all__ = ["fit_line", "repeated_median"]
+__all__ = ["first_median", "fit_line", "repeated_median"]
 
 
 def repeated_median(values: ArrayLike) -> tuple[float, float]:
@@ -66,15 +66,15 @@ def fit_line(values: FloatArray) -> tuple[float, float]:
                 if j != i:
                     rise = known[j] - known[i]
                     slopes[j if j < i else j - 1] = rise * inverse[at[j] - at[i] + n - 1]
-            inner[i] = _median(slopes, m - 1)
-        slope = _median(inner, m)
+            inner[i] = first_median(slopes, m - 1)
+        slope = first_median(inner, m)
     for i in range(m):
         known[i] -= slope * at[i]
-    return _median(known, m), slope
+    return first_median(known, m), slope
 
 
 @helper
-def _median(values: FloatArray, n: int) -> float:
+def first_median(values: FloatArray, n: int) -> float:
     """Median of the first n ≥ 1 values, which change their order (Hoare's quickselect)."""
     upper = _select(values, n, n // 2)
     if n % 2 == 1:

@@ -77,6 +77,12 @@ class Heard(NamedTuple):
         known = self.delay[np.isfinite(self.delay)]
         return float(np.median(known)) if len(known) else math.nan
 
+    @property
+    def slowest(self) -> float:
+        """Delay that 95 of 100 observations do not exceed, s; NaN without times of arrival."""
+        known = self.delay[np.isfinite(self.delay)]
+        return float(np.quantile(known, 0.95, method="higher")) if len(known) else math.nan
+
 
 def hear(
     heard: tuple[Heard, ...], source: int, log: Log, begun: Sequence[Begun], arrival: float

@@ -21,6 +21,7 @@ from surefix.service.inbox import Arrived, Inbox
 
 __all__ = ["Line", "listen"]
 
+_CLIENTS: Final = 100  # of one server; more are turned away
 _BLOCK: Final = 1 << 16
 _AGAIN: Final = (0.2, 5.0)  # s between attempts to connect: at first, and at most
 _CLOCK: Final = re.compile(rb"\$..(?:GGA|RMC|GNS|ZDA|GLL,[^*]*?),(\d{2})(\d{2})(\d{2}(?:\.\d+)?)")
@@ -45,7 +46,7 @@ class Line:
         Bytes so far, of a log those of earlier runs, too, and s, Unix, when the last came; NaN
         before.
     refused
-        Datagrams of senders that are not listed, and the last such sender.
+        Datagrams and clients that are not listed, clients that are too many, and the last of them.
     ended
         Whether a recorded log has come to its end.
     """
@@ -149,7 +150,10 @@ async def _clients(line: Line, listed: _Listed, arrived: Callable[[bytes], None]
     async def client(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         nonlocal inside
         host = str(writer.get_extra_info("peername")[0])
-        if listed(host):
+        if inside >= _CLIENTS:
+            line.refused, line.refused_from = line.refused + 1, host
+            writer.transport.abort()
+        elif listed(host):
             inside += 1
             line.connected = True
             with contextlib.suppress(OSError):

@@ -44,8 +44,9 @@ class _Record(NamedTuple):
     rejected, innovation
         As in `SensorState`.
     lean, others
-        (3,) standard deviations that it leans to one side, and that the others do on average: a
-        motion that nobody follows at once makes all of them lean; NaN where there is nothing.
+        (3,) standard deviations that it leans to one side, and that the others do on average, but
+        for suspect ones: a motion that nobody follows at once makes all of them lean; NaN where
+        there is nothing.
     suspect
         Whether the filter left most of its observations out, and does not use most of them since.
     stuck, lively
@@ -132,7 +133,7 @@ def _judged(heard: Heard, record: _Record, age: float, word: str) -> tuple[Valid
         return "invalid", f"frozen: the same since {clock(record.stuck)}"
     share = f"{record.rejected:.0%} of its last observations rejected"
     least = _UPRIGHT if word == "biased" else _LEANS
-    away = np.fmin(np.abs(record.lean), np.abs(record.lean - record.others))
+    away = np.minimum(np.abs(record.lean), np.abs(record.lean - record.others))
     if np.any(away > least):
         side = f"biased against the others: {_side(record.lean, away)}"
         return ("invalid", f"{side}, {share}") if record.suspect else ("doubtful", side)
@@ -187,7 +188,7 @@ def _of(health: Health | None, index: int) -> _Record:
     if health is None or index >= len(health.seen) or health.seen[index] < _FEW:
         return _Record()
     lean = np.where((health.seen >= _FEW)[:, None], health.lean, np.nan)
-    others = np.delete(lean, index, axis=0)
+    others = np.delete(lean, index, axis=0)[~np.delete(health.suspect, index)]
     known = np.isfinite(others).sum(axis=0)
     average = np.where(known > 0, np.nansum(others, axis=0) / np.maximum(known, 1), np.nan)
     return _Record(

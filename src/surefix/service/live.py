@@ -19,7 +19,7 @@ from typing import Final
 
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
-from surefix.io.write_nmea import Epoch, sentences
+from surefix.io.write_nmea import sentences
 from surefix.service import alarms as alarm
 from surefix.service.alarms import Alarm
 from surefix.service.causes import Condition, causes
@@ -37,12 +37,14 @@ from surefix.service.station import (
     Latest,
     Station,
     begin_station,
+    fixes_begun,
     look_ahead,
     receive,
     resumed,
     stored,
 )
 from surefix.service.steady import SteadyClock
+from surefix.service.telling import epoch_of
 from surefix.types import Cleaned
 
 __all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
@@ -98,6 +100,7 @@ class Live:
     fixed_at: tuple[float, float] = (math.nan, math.nan)  # validity of the last row, and when seen
     stored_at: float = -math.inf
     shown_at: float = -math.inf
+    begun: tuple[int, float] = (0, -math.inf)  # fixes that were begun, and when that was looked at
     shed_at: float = -math.inf
     history: History = field(default_factory=lambda: History(0))
     watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
@@ -192,6 +195,7 @@ async def run_live(
                 await step(live, arrived, clock())
             for task in reading:
                 task.cancel()
+            await step(live, await inbox.take(0.01), clock())  # what has arrived is not lost
             if web is not None:
                 web.stop()
     except* (InputError, OutputError) as group:
@@ -221,7 +225,7 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
         live.now, live.shown_at = known, now
-        epoch = _epoch(known)
+        epoch = epoch_of(known)
         for wanted, output in live.outputs:
             text = sentences(epoch, talker=wanted.talker, types=wanted.sentences)
             told.append(_told(live, known.time, "nmea", text.decode("ascii")))
@@ -296,8 +300,9 @@ def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
     Dead reckoning goes on from the last row by the time that has passed since it was seen, so that
     a clock of this computer that is wrong does no harm.
     """
-    known = None
-    if fresh:
+    known, news = None, fixes_begun(live.station)
+    if fresh and (news != live.begun[0] or now - live.begun[1] >= _TICK):
+        live.begun = news, now
         live.ahead = look_ahead(live.station)
         known = live.ahead.shown
     if known is not None and not known.time <= live.fixed_at[0]:
@@ -325,28 +330,6 @@ def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
         for batch in batches
         for event in batch.events
     ]
-
-
-def _epoch(known: Latest) -> Epoch:
-    if known.geodetic is None:
-        return Epoch(known.time, heading=known.heading, depth=known.depth, known=False)
-    latitude, longitude, height = known.geodetic
-    east, north, _ = known.velocity
-    sigma_east, sigma_north, sigma_up = known.sigma_position
-    return Epoch(
-        time=known.time,
-        latitude=float(latitude),
-        longitude=float(longitude),
-        height=float(height),
-        east=float(east),
-        north=float(north),
-        sigma_east=float(sigma_east),
-        sigma_north=float(sigma_north),
-        sigma_up=float(sigma_up),
-        heading=known.heading,
-        depth=known.depth,
-        known=not known.dead_reckoned,
-    )
 
 
 async def _next(inbox: Inbox, stop: asyncio.Event) -> list[Arrived]:

@@ -52,6 +52,9 @@ SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
 
 _ROLES: Final = ("fixes", "depth", "heading")
+_INPUT: Final = {
+    "name", "from", "role", "allow", "require_checksum", "target", "lever_arm",
+}  # fmt: skip
 _TALKER: Final = re.compile(r"[A-Z]{2}")
 
 
@@ -265,9 +268,8 @@ def _list(place: Path, content: dict[str, Any], name: str) -> list[dict[str, Any
 
 
 def _input(place: Path, table: dict[str, Any]) -> InputOptions:
-    rest = _known(
-        place, "input", table, {"name", "from", "role", "allow", "require_checksum", "target"}
-    )
+    rest = _known(place, "input", table, _INPUT)
+    rest.pop("lever_arm", None)  # read with the options of the cleaning
     if "name" not in rest or "from" not in rest:
         raise OptionsError(f"{place}: an input without name or from", "both")
     where = address(str(rest.pop("from")), INPUTS)

@@ -105,20 +105,20 @@ class Review:
                 self._waiting = None
             return self._known[1]
 
-    def edit(self, rows: IntArray, action: Action) -> None:
-        """Accept, reject or restore the fixes of some rows of the last run."""
+    def edit(self, run: Run, rows: IntArray, action: Action) -> None:
+        """Accept, reject or restore the fixes of some rows of a run."""
         with self._lock:
-            append_edit(self._edits, action, self._chosen(rows))
+            append_edit(self._edits, action, _chosen(run, rows))
 
     def step(self, action: Action) -> None:
         """Undo or redo."""
         with self._lock:
             append_edit(self._edits, action)
 
-    def waiting(self) -> IntArray:
-        """Rows of the last run whose edits have changed since."""
+    def waiting(self, run: Run) -> IntArray:
+        """Rows of a run whose edits have changed since."""
         with self._lock:
-            run, log = self.last, self.log
+            log = self.log
             if self._waiting is None or self._waiting[0] is not run:
                 now = _codes(run.logs, log)
                 self._waiting = run, np.flatnonzero((now != run.edit)[run.place])
@@ -178,19 +178,6 @@ class Review:
         logs = tuple(kept)
         return Run(number, batches, shown, logs, _places(cleaned, logs), _codes(logs, log))
 
-    def _chosen(self, rows: IntArray) -> tuple[Chosen, ...]:
-        """Name the fixes of some rows as an edit log knows them."""
-        wanted, at = np.sort(self.last.place[rows]), 0
-        out: list[Chosen] = []
-        for name, parts in self.last.logs:
-            for log in parts:
-                assert log.fixes is not None
-                count = len(log.fixes.time)
-                first, last = np.searchsorted(wanted, (at, at + count))
-                out += chosen_of(name, log.sensors, log.fixes, wanted[first:last] - at)
-                at += count
-        return by_sensor(out)
-
 
 def begin_review(
     opener: Opener,
@@ -228,6 +215,18 @@ def pairs(one: Run, other: Run) -> tuple[IntArray, IntArray]:
     _, first, second = np.intersect1d(mine, others, return_indices=True)
     order = np.argsort(first)
     return first[order], second[order]
+
+
+def _chosen(run: Run, rows: IntArray) -> tuple[Chosen, ...]:
+    """Name the fixes of some rows as an edit log knows them."""
+    wanted, at = np.sort(run.place[rows]), 0
+    out: list[Chosen] = []
+    for number, log, fixes in _all_fixes(run.logs):
+        count = len(fixes.time)
+        first, last = np.searchsorted(wanted, (at, at + count))
+        out += chosen_of(run.logs[number][0], log.sensors, fixes, wanted[first:last] - at)
+        at += count
+    return by_sensor(out)
 
 
 def _kept(source: Source, kept: list[tuple[str, list[Log]]]) -> Source:

@@ -23,6 +23,7 @@ from surefix.report.page import write_report
 from surefix.service.review import Review, Run
 from surefix.service.review_choice import Part, chosen_rows, doubted
 from surefix.service.review_view import Window, compared, figure, outlined, said, told
+from surefix.service.web_file import file_answer
 from surefix.service.web_pages import Page
 from surefix.types import IntArray, Verdict
 
@@ -101,15 +102,15 @@ def review_app(review: Review, files: Mapping[str, Page], name: str, command: st
     ) -> Response:
         run, other = review.last, _other(review, compare)
         window = Window((x0, x1), (y0, y1), (t0, t1))
-        found = {"number": run.number, of: figure(run, of, review.waiting(), other, window)}
+        found = {"number": run.number, of: figure(run, of, review.waiting(run), other, window)}
         found["told"] = told(run)
         found["compared"] = compared(run, other) if other else None
         return Response(dumps(found), media_type=_JSON)
 
     @app.post("/api/choose")
     def choose(choice: ChoiceRecord) -> Response:
-        cleaned = review.last.shown
-        rows = _rows(review, choice)
+        run, rows = _meant(review, choice)
+        cleaned = run.shown
         verdicts = cleaned.verdicts.verdict[rows]
         found = {
             "total": len(rows),
@@ -126,7 +127,7 @@ def review_app(review: Review, files: Mapping[str, Page], name: str, command: st
 
     @app.post("/api/edit")
     def edit(decision: DecisionRecord) -> Response:
-        review.edit(_rows(review, decision), decision.action)
+        review.edit(*_meant(review, decision), decision.action)
         return _answer(_state(review))
 
     @app.post("/api/undo")
@@ -148,20 +149,21 @@ def review_app(review: Review, files: Mapping[str, Page], name: str, command: st
     def export(suffix: str) -> Response:
         if f".{suffix}" not in (*SUFFIXES, ".html"):
             raise HTTPException(400, "one of csv, parquet, geojson, gpx, nmea and html expected")
-        if len(review.waiting()):
+        run = review.last
+        if len(review.waiting(run)):
             raise HTTPException(409, "edits wait for a run; run it first, then export")
-        called, content = _exported(review.last, f"{name}.{suffix}")
+        called, content = _exported(run, f"{name}.{suffix}")
         kind = _KINDS.get(Path(called).suffix, _BINARY)
         headers = {"content-disposition": f'attachment; filename="{_plain(called)}"'}
         return Response(content, media_type=kind, headers=headers)
 
     @app.get("/")
     def page(request: Request) -> Response:
-        return _file(files, "review.html", request)
+        return file_answer(files, "review.html", request)
 
     @app.get("/pages/{called}")
     def part(called: str, request: Request) -> Response:
-        return _file(files, called, request)
+        return file_answer(files, called, request)
 
     return app
 
@@ -186,13 +188,13 @@ def _state(review: Review) -> dict[str, Any]:
         }
         for entry in log.entries[: -_ENTRIES - 1 : -1]
     ]
-    geographic = review.last.shown.track.geodetic is not None
+    run = review.last
+    geographic = run.shown.track.geodetic is not None
     return {
         **review.progress(),
-        "run": review.last.number,
-        "first": review.before is None,
-        "sources": list(review.last.shown.sources),
-        "waiting": len(review.waiting()),
+        "run": run.number,
+        "sources": list(run.shown.sources),
+        "waiting": len(review.waiting(run)),
         "edits": edits,
         "total": len(log.entries),
         "torn": log.torn,
@@ -208,8 +210,9 @@ def _other(review: Review, compare: Compare) -> Run | None:
     return None if run is review.last else run
 
 
-def _rows(review: Review, choice: ChoiceRecord) -> IntArray:
-    if choice.run != review.last.number:
+def _meant(review: Review, choice: ChoiceRecord) -> tuple[Run, IntArray]:
+    run = review.last
+    if choice.run != run.number:
         raise HTTPException(409, "the log was cleaned again since; choose once more")
     try:
         verdicts = [Verdict[word.upper()] for word in choice.verdicts]
@@ -223,7 +226,7 @@ def _rows(review: Review, choice: ChoiceRecord) -> IntArray:
         )
         for part in choice.parts
     ]
-    return chosen_rows(review.last.shown, parts, verdicts)
+    return run, chosen_rows(run.shown, parts, verdicts)
 
 
 def _exported(run: Run, called: str) -> tuple[str, bytes]:
@@ -247,16 +250,3 @@ def _exported(run: Run, called: str) -> tuple[str, bytes]:
 def _plain(name: str) -> str:
     """A name that is safe in a header."""
     return "".join(c if c.isascii() and (c.isalnum() or c in "-_. ") else "_" for c in name)
-
-
-def _file(files: Mapping[str, Page], name: str, request: Request) -> Response:
-    found = files.get(name)
-    if found is None:
-        raise HTTPException(404, "no such page")
-    headers = {"etag": found.tag, "cache-control": "no-cache", "vary": "accept-encoding"}
-    if request.headers.get("if-none-match") == found.tag:
-        return Response(status_code=304, headers=headers)
-    if "gzip" not in request.headers.get("accept-encoding", ""):
-        return Response(found.content, headers=headers, media_type=found.kind)
-    headers["content-encoding"] = "gzip"
-    return Response(found.packed, headers=headers, media_type=found.kind)

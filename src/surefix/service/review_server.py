@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import socket
 from typing import Any, Final, cast
@@ -61,7 +62,8 @@ class ReviewServer:
 
     def run(self) -> None:
         """Serve until interrupted, or `stop` is called."""
-        self._server.run(sockets=[self._socket])
+        with contextlib.suppress(KeyboardInterrupt):  # raised again once all is shut down
+            self._server.run(sockets=[self._socket])
 
     def stop(self) -> None:
         """Let `run` come to its end."""
@@ -87,6 +89,7 @@ def open_server(review: Review, name: str, command: str, port: int = 0) -> Revie
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind((_HOST, port))
+        listening.listen()  # who asks before it serves waits
     except (OSError, OverflowError) as error:
         listening.close()
         raise OutputError(

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from surefix.pipelines.state import Session
+from surefix.service.heard import QUANTITIES
 from surefix.types import Cleaned
 
 __all__ = ["FRESH", "series_at", "with_few_series"]
@@ -22,8 +23,8 @@ _ROLES: Final = {"heading_deg": "heading", "depth_m": "depth"}
 
 
 def with_few_series(session: Session) -> Session:
-    """Leave only the series that go out: the others need not be cleaned on trial."""
-    kept = {key: state for key, state in session.channels.items() if key[1] in _ROLES}
+    """Leave only the series that go out or are judged: others need not be cleaned on trial."""
+    kept = {key: state for key, state in session.channels.items() if key[1] in QUANTITIES}
     return replace(session, channels=kept)
 
 

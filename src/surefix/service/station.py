@@ -20,17 +20,17 @@ from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
 from surefix.pipelines.snapshot import restored, snapshot
 from surefix.pipelines.state import Session
-from surefix.service.delays import with_delays
 from surefix.service.heard import Heard, hear
 from surefix.service.options import LiveOptions
 from surefix.service.series import FRESH, series_at, with_few_series
-from surefix.types import Channel, Cleaned, Fixes, FloatArray, Log, Verdict
+from surefix.types import Cleaned, Fixes, FloatArray, Log, Verdict
 
 __all__ = [
     "Ahead",
     "Latest",
     "Station",
     "begin_station",
+    "fixes_begun",
     "latest",
     "look_ahead",
     "receive",
@@ -110,9 +110,6 @@ class Station:
         When something came of each sensor.
     rows
         How many rows are cleaned for good.
-    delays
-        By sensor: when observations of the last minute were received, and how long after they were
-        valid, s.
     """
 
     session: Session
@@ -121,7 +118,6 @@ class Station:
     shown: Latest | None = None
     heard: tuple[Heard, ...] = ()
     rows: int = 0
-    delays: tuple[Channel, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
@@ -142,13 +138,12 @@ class _Stored(NamedTuple):
     shown: Latest | None
     heard: tuple[Heard, ...]
     rows: int
-    delays: tuple[Channel, ...]
 
 
 def stored(station: Station) -> bytes:
     """Everything that is known, to be stored."""
     states = tuple(stream.state for stream in station.streams)
-    rest = station.after, station.shown, station.heard, station.rows, station.delays
+    rest = station.after, station.shown, station.heard, station.rows
     return snapshot(_Stored(station.session, states, *rest))
 
 
@@ -178,7 +173,6 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     session, streams, heard = station.session, [*station.streams], station.heard
     batches: list[Cleaned] = []
     fresh: set[int] = set()
-    delays = station.delays
     for piece in received:
         if session.merging.inflows[piece.source].ended:
             continue
@@ -187,8 +181,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
             fresh.add(piece.source)
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
-        heard = hear(heard, piece.source, log, stream.begun, piece.time)
-        delays = with_delays(delays, log.delays)
+        heard = hear(heard, piece.source, log, [*stream.begun, *stream.waiting], piece.time)
         session, done = advance(session, piece.source, log)
         batches += done
         behind = max((each.latest for each in heard), default=-math.inf) - session.options.reorder_s
@@ -204,7 +197,14 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
     rows = station.rows + sum(len(batch.track.time) for batch in batches)
-    return Station(session, tuple(streams), after, shown, heard, rows, delays), tuple(batches)
+    return Station(session, tuple(streams), after, shown, heard, rows), tuple(batches)
+
+
+def fixes_begun(station: Station) -> int:
+    """How many fixes were begun to be read, of all inputs: more of them make a newer position."""
+    inflows = station.session.merging.inflows
+    pairs = zip(station.streams, inflows, strict=True)
+    return sum(stream.count for stream, inflow in pairs if inflow.role == "fixes")
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:

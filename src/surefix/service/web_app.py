@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from surefix.io.journal import Told
 from surefix.service.live import acknowledge
 from surefix.service.web_access import SESSION_S, Role, cookie_name, session
+from surefix.service.web_file import file_answer
 from surefix.service.web_hub import Hub
 from surefix.service.web_metrics import Metrics
 from surefix.service.web_options import WebOptions
@@ -140,11 +141,11 @@ def web_app(
 
     @app.get("/", include_in_schema=False)
     async def dashboard(request: Request) -> Response:
-        return _file(files, "live.html", request)
+        return file_answer(files, "live.html", request)
 
     @app.get("/pages/{name}", include_in_schema=False)
     async def page(name: str, request: Request) -> Response:
-        return _file(files, name, request)
+        return file_answer(files, name, request)
 
     return app
 
@@ -157,16 +158,3 @@ async def _written(live: Live, number: int) -> bool:
             return False
         await asyncio.sleep(0.02)
     return True
-
-
-def _file(files: Mapping[str, Page], name: str, request: Request) -> Response:
-    found = files.get(name)
-    if found is None:
-        raise HTTPException(404, "no such page")
-    headers = {"etag": found.tag, "cache-control": "no-cache", "vary": "accept-encoding"}
-    if request.headers.get("if-none-match") == found.tag:
-        return Response(status_code=304, headers=headers)
-    if "gzip" not in request.headers.get("accept-encoding", ""):
-        return Response(found.content, headers=headers, media_type=found.kind)
-    headers["content-encoding"] = "gzip"
-    return Response(found.packed, headers=headers, media_type=found.kind)

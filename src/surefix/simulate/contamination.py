@@ -13,9 +13,10 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surefix.errors import OptionsError
-from surefix.simulate.drags import Drag, pull_of
+from surefix.simulate.errors import GROSS, Drag, directions, pull_of, scatter, velocity_errors
 from surefix.simulate.vehicles import Vehicle, drive
 from surefix.types import AXES, BoolArray, FloatArray
 
@@ -31,11 +32,9 @@ __all__ = [
     "draw_world",
 ]
 
-_GROSS = (10.0, 130.0)  # σ: 3 … 40 m where σ is 0.3 m
 _GOOD_BEFORE = 5  # fixes at the beginning without errors, unless the first is to be bad
 _BURST = 30  # fixes of the longest run of errors
 _GAP = (10.0, 60.0)  # intervals a dropout lasts
-_VELOCITY_RUN = (5, 40)  # epochs a run of wrong velocities lasts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +131,7 @@ class Scenario:
     """
 
     share: float = 0.05
-    size: tuple[float, float] = _GROSS
+    size: tuple[float, float] = GROSS
     one_axis: bool = False
     run: Literal["common", "independent"] | None = None
     drag: Drag | None = None
@@ -277,13 +276,13 @@ def draw(scenario: str, world: World, seed: int | Sequence[int]) -> Trial:
     position, velocity = path.position * sigma, path.velocity * sigma / world.interval_s
     jump = int(leap.integers(int(0.4 * n), int(0.7 * n))) if plan.jump else -1
     if plan.jump:
-        position[jump:] += plan.jump * sigma * _directions(leap, 1, d)
+        position[jump:] += plan.jump * sigma * directions(leap, 1, d)
     error = sigma * _errors(where, sizes, plan, n, d, jump)
     beside = position + sigma * other.standard_normal((n, d))
     beside[:, : 0 if plan.beside == "source" else d - 1 if plan.beside == "depth" else d] = np.nan
-    scatter = _scatter(noise, plan.freedom, (n, d))
-    slips = _velocity_errors(wrong, plan.velocity_runs, n, d)
-    fixes = position + sigma * scatter + error
+    rough = scatter(noise, plan.freedom, (n, d))
+    slips = velocity_errors(wrong, plan.velocity_runs, n, d)
+    fixes = position + sigma * rough + error
     fixes[~with_fix] = np.nan
     error[~with_fix] = 0.0
     trial = Trial(
@@ -319,13 +318,12 @@ def columns(trial: Trial) -> dict[str, FloatArray]:
     return table
 
 
-def columns_beside(trial: Trial) -> dict[str, FloatArray | TextArray] | None:
+def columns_beside(trial: Trial) -> dict[str, NDArray[np.generic]] | None:
     """Columns of the log of the sensor beside the fixes; None where there is none."""
     match trial.scenario.beside:
         case "source":
-            named = np.full(len(trial.time), "beside")
             own = dict(zip(AXES, trial.beside.T, strict=False))
-            return {"time": trial.time, "sensor": named, **own}
+            return {"time": trial.time, "sensor": np.full(len(trial.time), "beside"), **own}
         case "depth":
             return {"time": trial.time, "depth": -trial.beside[:, -1]}
     return None
@@ -338,8 +336,7 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
 
 def _rows(trial: Trial, kept: BoolArray) -> Trial:
     """Keep some rows; the jump is where the first kept row after it is."""
-    names = ("time", "position", "velocity", "fixes", "velocities", "beside", "error")
-    names += ("bad_velocity",)
+    names = "time", "position", "velocity", "fixes", "velocities", "beside", "error", "bad_velocity"
     jump = int(kept[: trial.jump].sum()) if trial.jump >= 0 else -1
     return replace(trial, jump=jump, **{name: getattr(trial, name)[kept] for name in names})
 
@@ -381,13 +378,13 @@ def _errors(
         rows = np.append(rows, 0)
     error[rows] = _lengths(sizes, plan, len(rows)) * _strikes(sizes, plan, len(rows), d)
     if plan.run == "common":
-        error[stretch] = _lengths(sizes, plan, 1) * _directions(sizes, 1, d)
+        error[stretch] = _lengths(sizes, plan, 1) * directions(sizes, 1, d)
     elif plan.run == "independent":
-        error[stretch] = _lengths(sizes, plan, len(stretch)) * _directions(sizes, len(stretch), d)
+        error[stretch] = _lengths(sizes, plan, len(stretch)) * directions(sizes, len(stretch), d)
     elif plan.drag == "vertical":
         error[stretch, -1] = pull
     elif plan.drag:
-        error[stretch] = pull[:, None] * _directions(sizes, 1, d)
+        error[stretch] = pull[:, None] * directions(sizes, 1, d)
     return error
 
 
@@ -398,29 +395,6 @@ def _lengths(rng: np.random.Generator, plan: Scenario, count: int) -> FloatArray
 def _strikes(rng: np.random.Generator, plan: Scenario, count: int, d: int) -> FloatArray:
     """Directions in space, or along one axis either way."""
     if not plan.one_axis:
-        return _directions(rng, count, d)
+        return directions(rng, count, d)
     struck = np.eye(d)[rng.integers(0, d, count)]
     return np.asarray(struck * rng.choice([-1.0, 1.0], (count, 1)))
-
-
-def _directions(rng: np.random.Generator, count: int, d: int) -> FloatArray:
-    """(count, d) unit vectors, all directions alike."""
-    arrows = rng.standard_normal((count, d))
-    return np.asarray(arrows / np.linalg.norm(arrows, axis=1, keepdims=True))
-
-
-def _scatter(rng: np.random.Generator, freedom: float, shape: tuple[int, int]) -> FloatArray:
-    """White noise of variance 1."""
-    if np.isinf(freedom):
-        return rng.standard_normal(shape)
-    return np.asarray(rng.standard_t(freedom, shape) * np.sqrt((freedom - 2.0) / freedom))
-
-
-def _velocity_errors(rng: np.random.Generator, runs: int, n: int, d: int) -> FloatArray:
-    """(n, d) errors of the velocities in σ: one common error a run."""
-    error = np.zeros((n, d))
-    for _ in range(runs):
-        first = int(rng.integers(_GOOD_BEFORE + 20, n - _VELOCITY_RUN[1]))
-        count = int(rng.integers(*_VELOCITY_RUN, endpoint=True))
-        error[first : first + count] = rng.uniform(*_GROSS) * _directions(rng, 1, d)
-    return error

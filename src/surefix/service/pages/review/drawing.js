@@ -95,7 +95,7 @@ export const plot = (place, on) => {
         ? x.map((value, i) => [value, y[i]])
         : [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
       if (panel) on.chosen({ panel, line });
-      draw();
+      draw().then(() => place.querySelector(".hoverlayer").replaceChildren()); // hides what is chosen
     });
     place.on("plotly_relayout", (change) => {
       if (quiet || !Object.keys(change).some((key) => key.includes("axis"))) return;

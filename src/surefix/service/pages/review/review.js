@@ -136,12 +136,13 @@ const drawOne = async (of) => {
   return found;
 };
 const draw = tried(async () => {
-  const found = await drawOne("plan");
-  await drawOne("strips");
+  const found = { ...(await drawOne("plan")), ...(await drawOne("strips")) };
+  $("plan").parentElement.classList.toggle("none", !found.plan);
   legend($("legend"), found, page.marks, hidden, () => {
     plan.hide(hidden);
     strips.hide(hidden);
   });
+  if ($("strips-note").textContent === $("plan-note").textContent) $("strips-note").textContent = "";
   tabled($("told"), found.told, found.compared);
   document.documentElement.dataset.drawn = String(found.number);
 });
@@ -251,8 +252,9 @@ tried(async () => {
   if (state.busy) again();
   setInterval(async () => {
     if (document.hidden || page.state.busy) return;
-    const fresh = await get("api/state").catch(() => null);
-    if (!fresh) return tell("surefix review has ended", "bad");
+    const ended = (error) => (error instanceof TypeError ? "surefix review has ended" : error.message);
+    const fresh = await get("api/state").catch((error) => void tell(ended(error), "bad"));
+    if (!fresh) return;
     const { total, run } = page.state;
     if (fresh.total === total && fresh.run === run) return;
     settle(fresh); // edited by another page, or on the command line

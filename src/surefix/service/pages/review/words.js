@@ -24,6 +24,7 @@ export const legend = (place, found, marks, hidden, changed) => {
   for (const figure of [found.plan, found.strips]) {
     for (const trace of figure ? figure.data : []) {
       const none = trace.name === "waits for a run" && !trace.x.length;
+      if (trace.name === "difference") continue; // its strip says what it is
       if (!none && trace.mode !== "markers+text" && !traces.has(trace.name)) {
         traces.set(trace.name, trace);
       }
@@ -34,7 +35,9 @@ export const legend = (place, found, marks, hidden, changed) => {
   );
   const focused = place.contains(document.activeElement) && document.activeElement.dataset.name;
   place.replaceChildren();
-  for (const [name, trace] of traces) {
+  const last = ["before", "waits for a run"];
+  const sorted = [...traces].sort((a, b) => last.indexOf(a[0]) - last.indexOf(b[0]));
+  for (const [name, trace] of sorted) {
     const button = document.createElement("button");
     button.type = "button";
     button.dataset.name = name;
