@@ -92,7 +92,7 @@ def test_a_drag_beside_velocities_is_caught(axes, name):
             found = estimated(trial, mode)
             assert ratio(trial, found, mode) < most[mode], (seed, mode)
             out = found.weight[far, :axes] < 0.5
-            assert (out.mean() > 0.85 if mode == "realtime" else out.all()) or not far.any()
+            assert not far.any() or out.mean() > (0.85 if mode == "realtime" else 0.999), seed
             if mode == "offline":
                 nees = ((found.mean[:, :axes] - trial.position) / found.sigma[:, :axes]) ** 2
                 assert nees[inside].mean() < 7.0, seed
