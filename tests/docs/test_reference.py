@@ -124,7 +124,7 @@ def _verdict(reason):
         detail = 1715673602.0
     verdict = (
         Verdict.REJECTED
-        if reason in (Reason.OFF, Reason.ISOLATED, Reason.RUN)
+        if reason in (Reason.OFF, Reason.ISOLATED, Reason.RUN, Reason.DRAG)
         else Verdict.DOWNWEIGHTED
     )
     one = [verdict, 0.5, 6.1, float("nan"), reason, detail, [4.1, -7.0, float("nan")]]

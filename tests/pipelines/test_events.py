@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import surefix as sf
+from surefix.reasons import texts
 
 MODES = ("realtime", "lagged", "offline")
 
@@ -103,3 +104,25 @@ def test_noise_that_grows_is_told(mode):
     changed = [event for event in found.events if event.kind == "noise-changed"]
     assert changed
     assert changed[0].time - 1.7e9 > 1500.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_drag_beside_velocities_is_told_once(mode):
+    """With the offset of each fix now; the fixes that begin and end it look like any other."""
+    t, fixes = dive(3, 600)
+    pull = np.clip(0.5 * np.arange(-300.0, 300.0), 0.0, 30.0)
+    pull[420:] = 0.0
+    fixes[:, 0] += 0.8 * pull
+    fixes[:, 1] -= 0.6 * pull
+    rng = np.random.default_rng(4)
+    ve = 0.5 + np.cos(t / 60.0) / 12.0 + rng.normal(0.0, 0.02, len(t))
+    vn = 0.2 + rng.normal(0.0, 0.02, len(t))
+    events, found = told(t, fixes, mode, "drag", ve=ve, vn=vn)
+    assert len(events) == 1
+    assert 295.0 < events[0][0] < 330.0
+    assert "wander off, by (" in events[0][1]
+    assert (found.verdicts.reason[330:419] == sf.Reason.DRAG).mean() > 0.95
+    np.testing.assert_allclose(found.verdicts.offset[400, :2], [24.0, -18.0], atol=2.5)
+    assert texts(found.verdicts)[400].startswith("in a drag of ")
+    assert np.isfinite(found.track.position[:, 0]).all()
+    assert (found.verdicts.verdict[430:] != sf.Verdict.REJECTED).mean() > 0.97

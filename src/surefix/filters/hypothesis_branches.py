@@ -194,7 +194,9 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
-    drags = -1 if decided else supposes(prior, bank, place, time, sensor)
+    drags = -1  # a depth alone does not wander off
+    if lead == 0 and not decided:
+        drags = supposes(prior, bank, place, time, sensor)
     in_row, rarer = math.log(prior.row), math.log1p(-prior.row) - math.log1p(-prior.isolated)
     for i in range(bank.number[0]):
         k, base = place[i], bank.weight[i]

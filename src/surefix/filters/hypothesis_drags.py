@@ -344,4 +344,9 @@ def keep_drags(
             at = count
         chosen[at] = best[j]
         weight[at] = score[best[j]] - kept
+    whole = 0.0
+    for i in range(end):
+        whole += math.exp(weight[i])
+    for i in range(end):
+        weight[i] -= math.log(whole)
     return end
