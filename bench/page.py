@@ -101,19 +101,24 @@ def _faster(results: Results) -> str:
     lines = [
         f"- {each.name}, {contest.name}: {1.0 / each.times_ours:.2f} × our speed"
         for contest, standings in results
-        for each in standings[1:]
-        if each.times_ours < 1.0 and not each.name.startswith(("surefix", "its "))
+        for each in _peers(standings)
+        if each.times_ours < 1.0
     ]
     return "\n## Where a peer is faster\n\n" + ("\n".join(lines) or "Nowhere in this run.") + "\n"
 
 
+def _peers(standings: list[Standing]) -> list[Standing]:
+    """The contestants that are not ours."""
+    return [each for each in standings[1:] if not each.name.startswith(("surefix", "its "))]
+
+
 def chart(results: Results) -> str:
-    """Bars on a logarithmic scale: how many times our cost each contestant takes."""
+    """Bars on a logarithmic scale: how many times our cost each peer takes."""
     rows: list[tuple[str, str, float]] = []
     for contest, standings in results:
         rows += [
             (contest.name if i == 0 else "", each.name, each.times_ours)
-            for i, each in enumerate(standings[1:])
+            for i, each in enumerate(_peers(standings))
         ]
     most = max((each for *_, each in rows), default=10.0)
     low, high = -1.0, max(1.0, math.ceil(math.log10(most)))

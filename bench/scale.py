@@ -104,15 +104,20 @@ def _draw(rows: list[dict[str, str | float]]) -> None:
     mpl.use("svg")
     mpl.rcParams["svg.hashsalt"] = "surefix"
     from matplotlib import pyplot as plt
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     figure, (cost, memory) = plt.subplots(1, 2, figsize=(9.0, 3.6), layout="constrained")
     for method, mode in dict.fromkeys((row["method"], row["mode"]) for row in rows):
         mine = [row for row in rows if (row["method"], row["mode"]) == (method, mode)]
         size = [row["fixes"] for row in mine]
         cost.loglog(size, [row["processor s"] for row in mine], "o-", label=f"{method}, {mode}")
-        memory.loglog(size, [row["MB"] for row in mine], "o-")
+        memory.semilogx(size, [row["MB"] for row in mine], "o-")
     cost.set(xlabel="fixes", ylabel="processor time, s", title="Cost")
     memory.set(xlabel="fixes", ylabel="most memory, MB", title="Memory")
+    memory.set_ylim(bottom=0.0)
+    cost.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    cost.yaxis.set_major_formatter("{x:g}")
+    cost.yaxis.set_minor_formatter(NullFormatter())
     cost.legend(fontsize="small")
     for axes in (cost, memory):
         axes.grid(alpha=0.3)
