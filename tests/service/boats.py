@@ -105,22 +105,27 @@ def send(port: int, datagrams: Iterable[bytes]) -> None:
             out.sendto(data, ("127.0.0.1", port))
 
 
-def told(folder: Path) -> dict[float, dict[str, float]]:
-    """What live knew when it told of each instant, from its journal, by the time of validity."""
+def told(folder: Path) -> dict[int, dict[str, float]]:
+    """What live knew when it told of each instant, by the hundredth of a second."""
     options = read_live(folder / "live.toml")
     journal = open_journal(options.journal, new=False)
-    afters = sorted({each.after for each in journal.told() if each.kind == "nmea"})
+    epochs = sorted({(each.after, each.time) for each in journal.told() if each.kind == "nmea"})
     station, known = begin_station(options), {}
     received = list(journal.received())
     journal.close()
-    for begin, end in zip([0, *afters], afters, strict=False):
+    begin = 0
+    for end, time_told in epochs:
         station, _ = receive(station, received[begin:end])
-        now = latest(station)
+        begin, now = end, latest(station)
         assert now is not None
+        if time_told > now.time:  # dead reckoning
+            now = latest(station, time_told)
+            assert now is not None
+        assert now.time == time_told
         assert now.geodetic is not None
         latitude, longitude, height = now.geodetic.tolist()
         east, north, _ = now.velocity.tolist()
-        known[round(now.time, 3)] = {
+        known[round(now.time * 100.0)] = {
             "latitude": latitude, "longitude": longitude, "height": height,
             "speed": float(np.hypot(east, north)),
             "course": float(np.degrees(np.arctan2(east, north)) % 360.0),

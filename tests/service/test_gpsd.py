@@ -86,7 +86,7 @@ def check(text, known):
     errors = 0
     for report in reports:
         at = datetime.fromisoformat(report["time"]).timestamp()
-        now = known[round(at, 3)]
+        now = known[round(at * 100.0)]
         assert report["lat"] == pytest.approx(now["latitude"], abs=1e-8)
         assert report["lon"] == pytest.approx(now["longitude"], abs=1e-8)
         if "altMSL" in report:

@@ -119,7 +119,7 @@ def check_stream(seen, known):
             if (
                 source in at
                 and value["value"] is not None
-                and matches(path, value["value"], known[round(at[source], 3)])
+                and matches(path, value["value"], known[round(at[source] * 100.0)])
             ):
                 counts[source, path] = counts.get((source, path), 0) + 1
     assert len(counts) == 10
@@ -127,9 +127,11 @@ def check_stream(seen, known):
 
 
 def check_vessel(vessel, known):
-    """What the REST API holds is the last that was told."""
-    last = known[max(known)]
+    """What the REST API holds is what was told of the instant that it says."""
     navigation = vessel["navigation"]
+    at = datetime.fromisoformat(navigation["position"]["timestamp"]).timestamp()
+    last = known[round(at * 100.0)]
+    assert max(known) - round(at * 100.0) < 300
     for name in ("position", "speedOverGround", "courseOverGroundTrue", "headingTrue"):
         assert matches(f"navigation.{name}", navigation[name]["value"], last)
     depth = vessel["environment"]["depth"]["belowTransducer"]["value"]
