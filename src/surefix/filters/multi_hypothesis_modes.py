@@ -174,11 +174,9 @@ def decide_offline(
     back = _decided(motion, prior, backward(motion, epochs))
     d = motion.axes
     slips = ahead.fixed[:, d] == 0.0, back.fixed[::-1, d] == 0.0
-    slipped, used = settle_velocities(motion, prior, epochs, *slips)
-    fixed = np.minimum(ahead.fixed, back.fixed[::-1])
-    fixed[used, d:] = np.maximum(ahead.fixed, back.fixed[::-1])[used, d:]
+    slipped = settle_velocities(motion, prior, epochs, *slips)
     said = Decisions(
-        fixed,
+        np.minimum(ahead.fixed, back.fixed[::-1]),
         _in_both(epochs.time, ahead.jump, back.jump[::-1], prior.longest),
         ahead.run & back.run[::-1],
     )
