@@ -23,7 +23,7 @@ _BRIEFLY = 16  # hypotheses kept
 
 def settle_velocities(
     motion: Motion, prior: Prior, epochs: Epochs, ahead: BoolArray, back: BoolArray
-) -> tuple[BoolArray, BoolArray]:
+) -> BoolArray:
     """Decide together on velocities of a sensor on end that only one direction leaves out.
 
     Parameters
@@ -35,12 +35,12 @@ def settle_velocities(
 
     Returns
     -------
-    out, used
-        (n,) those that are out for good, which both directions say or the likelier account, and
-        those that it uses. A single velocity that is in dispute is neither.
+    out
+        (n,) those that are out for good: both directions say so, or the likelier account. Others in
+        dispute are judged one by one: fixes may have been doubted for their sake.
     """
     moving = np.isfinite(epochs.z[:, motion.axes :]).any(axis=1)
-    out, used = ahead & back & moving, np.zeros(len(ahead), np.bool_)
+    out = ahead & back & moving
     sensor = epochs.sensor if len(epochs.sensor) else np.zeros(len(ahead), np.int64)
     for own in np.unique(sensor[(ahead ^ back) & moving]):
         mine = np.flatnonzero(moving & (sensor == own))
@@ -50,8 +50,8 @@ def settle_velocities(
             if end - first < _FEWEST:
                 continue
             wrong, good = (_evidence(motion, prior, epochs, out, rows, w) for w in (0.0, 1.0))
-            (out if wrong > good else used)[rows] = True
-    return out, used
+            out[rows] = wrong > good
+    return out
 
 
 def _evidence(

@@ -180,10 +180,8 @@ def decide_offline(
     ahead, back = _settled(epochs.time, ahead, back, evidence - reverse[::-1], prior.longest)
     d = motion.axes
     slips = ahead.fixed[:, d] == 0.0, back.fixed[:, d] == 0.0
-    slipped, used = settle_velocities(motion, prior, epochs, *slips)
-    fixed = np.minimum(ahead.fixed, back.fixed)
-    fixed[used, d:] = np.maximum(ahead.fixed, back.fixed)[used, d:]
-    said = Decisions(fixed, jump, ahead.run & back.run)
+    slipped = settle_velocities(motion, prior, epochs, *slips)
+    said = Decisions(np.minimum(ahead.fixed, back.fixed), jump, ahead.run & back.run)
     locked = np.column_stack([said.run > 0, slipped])
     for _ in range(_SWEEPS):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
