@@ -43,10 +43,14 @@ class Chunk(NamedTuple):
 
 
 class _Inflow(NamedTuple):
-    """Where one input stands: its clock, rows held back by it, and rows in order."""
+    """Where one input stands: its sensors and clock, rows held back by it, and rows in order.
+
+    In its rows a sensor has its number in ``sensors`` here.
+    """
 
     name: str
     role: str
+    sensors: tuple[str, ...] = ()
     clock: ClockState = ClockState()
     held: Fixes | None = None
     ready: tuple[Rows, ...] = ()
@@ -62,8 +66,9 @@ class Merging(NamedTuple):
     ----------
     inflows
         One per input.
-    sensors
-        Names of all sensors met so far; ``Fixes.sensor`` indexes them.
+    sensors, homes
+        Names of all sensors in the order of the rows that were let go, which is the same however
+        the inputs arrived; ``Fixes.sensor`` indexes them. And the number of the input of each.
     patience
         s that an input may be behind the others before they wait for it no longer.
     released
@@ -76,6 +81,7 @@ class Merging(NamedTuple):
 
     inflows: tuple[_Inflow, ...]
     sensors: tuple[str, ...] = ()
+    homes: tuple[int, ...] = ()
     patience: float = np.inf
     released: float = -np.inf
     arms: tuple[Arm, ...] = ()
@@ -121,14 +127,12 @@ def merge(
         How far out of order a row may be, and how much too late the times of a sensor are.
     """
     inflow = merging.inflows[source]._replace(ended=log is None)
-    sensors = list(merging.sensors)
     fixes = _supporting(log, inflow.role) if log is not None else None
     if fixes is not None and log is not None:
         delay = options.sensor_delay_s
         names = log.sensors if inflow.role != "depth" else _depth_sensors(log)
-        numbers = np.array([_number(sensors, name) for name in names] or [0])
-        arms = (*merging.arms, *_arms(sensors[len(merging.arms) :], inflow.name, options))
-        merging = merging._replace(arms=arms)
+        inflow = inflow._replace(sensors=tuple(dict.fromkeys((*inflow.sensors, *names))))
+        numbers = np.array([inflow.sensors.index(name) for name in names] or [0])
         delays = np.array([delay.get(name, 0.0) for name in names] or [0.0])
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
@@ -146,9 +150,11 @@ def merge(
             inflows[i], more = _order(each, None, options.reorder_s, least)
             events = (*events, *more)
     inflows, rows, released = _release(inflows, merging, least)
-    if rows is not None and options.lever_arm:
-        rows = _with_arms(rows, merging, options)
-    after = merging._replace(inflows=tuple(inflows), sensors=tuple(sensors), released=released)
+    after = merging._replace(inflows=tuple(inflows), released=released)
+    if rows is not None:
+        after, rows = _numbered(after, rows, options)
+        if options.lever_arm:
+            rows = _with_arms(rows, after, options)
     if log is None:
         return after, Chunk(rows, (), events, (), False)
     channels = tuple(each for each in log.channels if each.name != _NO_SERIES)
@@ -157,10 +163,21 @@ def merge(
     return after, Chunk(rows, channels, events, log.problems, log.depth_positive_down)
 
 
-def _number(sensors: list[str], name: str) -> int:
-    if name not in sensors:
-        sensors.append(name)
-    return sensors.index(name)
+def _numbered(merging: Merging, rows: Rows, options: CleanOptions) -> tuple[Merging, Rows]:
+    """Number the sensors of rows that are let go, new ones in the order in which they appear."""
+    labels = [(i, name) for i, inflow in enumerate(merging.inflows) for name in inflow.sensors]
+    found, first = np.unique(rows.fixes.sensor, return_index=True)
+    sensors, homes, arms = [*merging.sensors], [*merging.homes], [*merging.arms]
+    numbers = np.zeros(len(labels), np.int64)
+    for place in found[np.argsort(first)]:
+        home, name = labels[place]
+        if name not in sensors:
+            sensors.append(name)
+            homes.append(home)
+            arms.append(_arm(name, merging.inflows[home].name, options))
+        numbers[place] = sensors.index(name)
+    merging = merging._replace(sensors=tuple(sensors), homes=tuple(homes), arms=tuple(arms))
+    return merging, rows._replace(fixes=rows.fixes._replace(sensor=numbers[rows.fixes.sensor]))
 
 
 def _reached(log: Log, before: float) -> float:
@@ -188,10 +205,10 @@ def _supporting(log: Log, role: str) -> Fixes | None:
     )
 
 
-def _arms(fresh: list[str], name: str, options: CleanOptions) -> list[Arm]:
-    """Where the antennas of new sensors of an input are: named by sensor, or by input."""
+def _arm(name: str, home: str, options: CleanOptions) -> Arm:
+    """Where the antenna of a sensor is: named by sensor, or by input."""
     given = options.lever_arm
-    return [tuple(given.get(each, given.get(name, ()))) for each in fresh]
+    return tuple(given.get(name, given.get(home, ())))
 
 
 def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging]:
@@ -267,14 +284,17 @@ def _release(
 ) -> tuple[list[_Inflow], Rows | None, float]:
     """Merge the ready rows that no input can still precede; also tells up to when.
 
-    An input that is behind ``least`` is not waited for.
+    An input that is behind ``least`` is not waited for. The sensors of all inputs are numbered
+    through.
     """
     waits = (max(inflow.last_tau, least) for inflow in inflows if not inflow.ended)
     until = min(waits, default=np.inf)
     out: list[Rows] = []
     keys: list[FloatArray] = []
     after: list[_Inflow] = []
+    before = 0
     for inflow in inflows:
+        own, before = before, before + len(inflow.sensors)
         if not inflow.ready:
             after.append(inflow)
             continue
@@ -282,7 +302,8 @@ def _release(
         key = _carried(rows.tau)
         stay = (key >= until) & (len(inflows) > 1) & (until < np.inf)
         after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
-        out.append(take_rows(rows, ~stay))
+        free = take_rows(rows, ~stay)
+        out.append(free._replace(fixes=free.fixes._replace(sensor=free.fixes.sensor + own)))
         keys.append(key[~stay])
     released = max([merging.released, *(float(key[-1]) for key in keys if len(key))])
     if not sum(len(rows.tau) for rows in out):

@@ -8,14 +8,13 @@ import numpy as np
 
 from surefix.cleaning.duplicates import idle_axes, start_repeats
 from surefix.errors import OptionsError
-from surefix.filters.hypotheses import MOST_SENSORS
 from surefix.pipelines.judge import begin
 from surefix.pipelines.latency import Late, find_late, late_events
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import Rows, take_rows
 from surefix.pipelines.setup import Setup, localise, settle
 from surefix.pipelines.state import Session
-from surefix.types import BoolArray, Event, IntArray, Noise
+from surefix.types import BoolArray, Event, Noise
 
 __all__ = ["begin_rows", "settle_session"]
 
@@ -66,13 +65,9 @@ def settle_session(
     if unknown:
         known = ", ".join(session.sensors)
         raise OptionsError(f"options for sensor {unknown[0]!r}", f"one of {known}")
-    numbers, first, rank = np.unique(rows.fixes.sensor, return_index=True, return_inverse=True)
-    met = np.argsort(first)  # the sensors of the head in the order in which they appear
-    ranked = rows.fixes._replace(sensor=np.argsort(met)[rank])
-    names = [session.sensors[number] for number in numbers[met]]
-    setup = settle(rows._replace(fixes=ranked), usable, names, options)
-    setup = _numbered(setup, numbers[met])
-    setup = replace(setup, noise=_in_order(setup.noise, session.sensors))
+    met = int(rows.fixes.sensor.max(initial=-1)) + 1
+    setup = settle(rows, usable, list(session.sensors[:met]), options)
+    setup = replace(setup, noise=_in_order(setup.noise, session))
     late = _late(session, setup, rows, usable)
     removed = bool(late) and options.latency == "remove"
     events = late_events(late, removed=removed)
@@ -84,27 +79,13 @@ def settle_session(
     return replace(session, setup=setup, filter=track), tuple(events), ()
 
 
-def _numbered(setup: Setup, met: IntArray) -> Setup:
-    """Give the figures of the sensors that were ``met`` the places of their numbers."""
-    count = int(met.max(initial=-1)) + 1
-    position, velocity = (np.full((count, 3), np.nan) for _ in range(2))
-    offset, prior = np.zeros(count), setup.prior
-    position[met], velocity[met], offset[met] = setup.position, setup.velocity, setup.height_offset
-    if prior is not None:
-        told = met[:MOST_SENSORS] < MOST_SENSORS
-        adapt = np.zeros_like(prior.adapt)
-        adapt[met[:MOST_SENSORS][told]] = prior.adapt[: len(met)][told]
-        prior = prior._replace(adapt=adapt)
-    return replace(setup, position=position, velocity=velocity, height_offset=offset, prior=prior)
-
-
-def _in_order(noise: tuple[Noise, ...], sensors: tuple[str, ...]) -> tuple[Noise, ...]:
+def _in_order(noise: tuple[Noise, ...], session: Session) -> tuple[Noise, ...]:
     """Name the sensors in the order of the inputs; each block ends with the noise of the motion."""
-    place = {name: number for number, name in enumerate(sensors)}
+    homes = dict(zip(session.sensors, session.merging.homes, strict=True))
     block, keys = 0, []
     for each in noise:
-        keys.append((block, place.get(each.sensor, len(place))))
-        block += each.sensor not in place
+        keys.append((block, homes.get(each.sensor, len(homes))))
+        block += each.sensor not in homes
     return tuple(noise[i] for i in sorted(range(len(noise)), key=keys.__getitem__))
 
 
