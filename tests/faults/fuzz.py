@@ -11,7 +11,7 @@ import time
 from itertools import pairwise
 from pathlib import Path
 
-from faults.mutations import mutated
+from faults.mutations import mutated, sentence
 from surefix.io.acoustic_line import read_line
 from surefix.io.nmea_clock import receive_time
 from surefix.io.nmea_frame import START, finish, frame
@@ -20,6 +20,9 @@ from surefix.io.nmea_log import read_nmea
 from surefix.io.nmea_stream import NmeaStream
 
 BATCH = 10_000
+DATED = sentence(b"GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230324,003.1,W,A") + b"\r\n"
+# Each log begins with a date: rows before the first one do not wait for it without end, and if one
+# comes when they are gone, they have none. That depends on how the log is cut, and is said.
 
 
 def batch(seed, size=BATCH):
@@ -97,7 +100,7 @@ def memory():
 def read(seed, folder=None):
     """Read one batch by one of the ways, and hold it against what must be."""
     source = random.Random(~seed)
-    data = b"".join(batch(seed))
+    data = DATED + b"".join(batch(seed))
     cuts = sorted(source.randrange(len(data)) for _ in range(source.choice((1, 10, 1000))))
     by = (by_kernel, by_stream)[seed % 2]
     logs = by(data, cuts)
