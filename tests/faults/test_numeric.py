@@ -148,7 +148,8 @@ def test_fault_23_a_jump_of_500_m(tmp_path, mode):
 @pytest.mark.parametrize("mode", ["realtime", "lagged"])
 def test_fault_24_recovery_while_velocities_are_accepted(tmp_path, mode):
     log = survey(400)
-    velocity = {"ve": np.gradient(survey(400, sigma=0.0)["x"]), "vn": np.full(400, 0.3)}
+    still = survey(400, sigma=0.0)
+    velocity = {"ve": np.gradient(still["x"]), "vn": np.gradient(still["y"])}
     x = log["x"] + 500.0 * (np.arange(400) >= 200)
     track = run(tmp_path, {**log, "x": x, **velocity}, "--mode", mode)
     truth = survey(400, sigma=0.0)["x"] + 500.0 * (np.arange(400) >= 200)

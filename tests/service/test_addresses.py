@@ -34,6 +34,7 @@ def test_is_refused_with_what_was_expected(text):
         address(text, INPUTS)
 
 
-def test_outputs_are_no_files():
-    with pytest.raises(OptionsError, match="udp://, tcp-listen://, serial://"):
+def test_outputs_are_files_of_a_kind_that_can_be_gone_on_with():
+    assert address("file:///a.csv", OUTPUTS).path == "/a.csv"
+    with pytest.raises(OptionsError, match=r"ends in \.csv or \.parquet"):
         address("file:///a", OUTPUTS)

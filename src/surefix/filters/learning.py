@@ -91,7 +91,7 @@ def supposed(
         again=0.9,
         spread=np.repeat([_WILD * sigma_position, _WILD * sigma_velocity], axes),
         sigma_velocity=speed,
-        drag=1e-5,
+        drag=0.0,
         steady=_BIAS * sigma_velocity,
     )
 

@@ -126,7 +126,8 @@ def begin_station(options: LiveOptions) -> Station:
     streams = tuple(
         NmeaStream(Path(each.name), each.require_checksum, each.target) for each in options.inputs
     )
-    return Station(begin_session(inputs, options.clean, live=True), streams)
+    patient = any(each.address.kind == "file" for each in options.inputs)  # a log comes to its end
+    return Station(begin_session(inputs, options.clean, live=not patient), streams)
 
 
 class _Stored(NamedTuple):
@@ -184,7 +185,7 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
         heard = hear(heard, piece.source, log, [*stream.begun, *stream.waiting], piece.time)
         session, done = advance(session, piece.source, log)
         batches += done
-        behind = max((each.latest for each in heard), default=-math.inf) - session.options.reorder_s
+        behind = max((each.latest for each in heard), default=-math.inf) - session.merging.patience
         for i, other in enumerate(streams):
             begun = other.begun
             if i != piece.source and begun and begun[0][2] < behind:

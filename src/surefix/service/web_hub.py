@@ -74,10 +74,14 @@ class Hub:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._news.wait(), _IDLE)
             self._news.clear()
-            if self._queues:
-                self._tell(self.record().model_dump_json())
-            self._next = self._live.history.total
+            self._publish()
             await asyncio.sleep(_APART)
+
+    def _publish(self) -> None:
+        """Tell all clients what is new, now."""
+        if self._queues:
+            self._tell(self.record().model_dump_json())
+        self._next = self._live.history.total
 
     def _tell(self, text: str) -> None:
         for websocket, queue in tuple(self._queues.items()):
@@ -97,6 +101,7 @@ class Hub:
             return await websocket.send_denial_response(JSONResponse({"detail": text}, 503))
         await websocket.accept()
         queue: asyncio.Queue[str] = asyncio.Queue(_BACKLOG)
+        self._publish()  # so that the new client does not hear again what its first record holds
         queue.put_nowait(self.record().model_dump_json())
         self._queues[websocket] = queue
         self._state.clients = len(self._queues)
