@@ -120,8 +120,8 @@ def vary(variant: Variant) -> None:
         learning = import_module("surefix.filters.learning")
         usual = learning.supposed
 
-        def supposed(*given: float) -> Any:
-            prior = usual(*given)
+        def supposed(*given: float, **words: bool) -> Any:
+            prior = usual(*given, **words)
             value = varied(rule, getattr(prior, attribute), variant.up)
             return prior._replace(**{attribute: value})
 

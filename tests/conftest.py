@@ -23,3 +23,11 @@ def data() -> Path:
 def postgres():
     """A PostgreSQL server of our own; the test is skipped where it is not installed."""
     yield from cluster.cluster()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Let what shares an experiment run in one process: it would be computed twice."""
+    for item in items:
+        if item.path.parent.name in ("papers", "comparison"):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))

@@ -149,6 +149,10 @@ def clean(
         Literal["report", "remove", "ignore"] | None,
         typer.Option(help="Fixes that are late against a velocity; default report."),
     ] = None,
+    drags: Annotated[
+        bool,
+        typer.Option("--drags", help="Look for fixes that wander off slowly; see the docs first."),
+    ] = False,
     sensor_delay: Annotated[
         list[str] | None,
         typer.Option(
@@ -196,6 +200,7 @@ def clean(
             "process": process,
             "every_s": _seconds("--every", every),
             "latency": latency,
+            "drags": drags or None,
         },
         _delays(sensor_delay or []),
     )

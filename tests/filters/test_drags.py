@@ -46,7 +46,8 @@ def posed(trial):
     motion = Motion(2, d, np.full(d, world.process**2), by_axis(d), 2 * d, 0.0)
     speed = 20.0 * world.sigma_m / world.interval_s
     longest = 39.5 * world.interval_s
-    return motion, supposed(d, world.sigma_m, world.sigma_mps, speed, longest), epochs
+    made = supposed(d, world.sigma_m, world.sigma_mps, speed, longest, drags=True)
+    return motion, made, epochs
 
 
 def estimated(trial, mode):

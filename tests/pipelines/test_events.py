@@ -16,9 +16,9 @@ def dive(seed=1, n=1200):
     return t, truth + rng.normal(0.0, 0.4, truth.shape)
 
 
-def told(t, fixes, mode, kind, **more):
+def told(t, fixes, mode, kind, *, drags=False, **more):
     log = {"time": 1.7e9 + t, "x": fixes[:, 0], "y": fixes[:, 1], **more}
-    found = sf.clean(log, options=sf.CleanOptions(mode=mode))
+    found = sf.clean(log, options=sf.CleanOptions(mode=mode, drags=drags))
     return [(event.time - 1.7e9, event.text) for event in found.events if event.kind == kind], found
 
 
@@ -117,7 +117,7 @@ def test_a_drag_beside_velocities_is_told_once(mode):
     rng = np.random.default_rng(4)
     ve = 0.5 + np.cos(t / 60.0) / 12.0 + rng.normal(0.0, 0.02, len(t))
     vn = 0.2 + rng.normal(0.0, 0.02, len(t))
-    events, found = told(t, fixes, mode, "drag", ve=ve, vn=vn)
+    events, found = told(t, fixes, mode, "drag", drags=True, ve=ve, vn=vn)
     assert len(events) == 1
     assert 295.0 < events[0][0] < 330.0
     assert "wander off, by (" in events[0][1]

@@ -99,7 +99,8 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
     Parameters
     ----------
     trial
-        What is to be cleaned. Its scenario may want a wrong noise to be given.
+        What is to be cleaned. Its scenario may want a wrong noise to be given, and drags
+        are only looked for where there are any.
     method, mode
         Of `CompareOptions`.
     """
@@ -112,6 +113,7 @@ def clean_trial(trial: Trial, method: str, mode: Mode) -> Cleaned:
         lag_s=lag_of(trial) if mode == "lagged" else None,
         sigma_position=wrong,
         sigma_height=wrong,
+        drags=trial.scenario.drag is not None,
     )
     beside = columns_beside(trial)
     if trial.scenario.beside == "depth":

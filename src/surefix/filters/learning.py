@@ -36,6 +36,7 @@ _SHARES = {
     "manoeuvre": (0.02, 100.0),
     "row": (1.0, 3.0),
 }  # prior counts: wrong, and all
+_DRAG = 1e-5  # probability that a drag begins in a stretch of eight fixes, if any do
 _BIAS = 2.0  # standard deviations that velocities may be wrong by for good
 _FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
@@ -64,7 +65,13 @@ class Learnt(NamedTuple):
 
 
 def supposed(
-    axes: int, sigma_position: float, sigma_velocity: float, speed: float, longest: float
+    axes: int,
+    sigma_position: float,
+    sigma_velocity: float,
+    speed: float,
+    longest: float,
+    *,
+    drags: bool = False,
 ) -> Prior:
     """What is supposed of a log that nothing is known of.
 
@@ -78,6 +85,8 @@ def supposed(
         Standard deviation of a velocity nothing is known about, m/s.
     longest
         Longest run, s.
+    drags
+        Whether fixes may wander off slowly.
     """
     return Prior(
         isolated=0.05,
@@ -91,7 +100,7 @@ def supposed(
         again=0.9,
         spread=np.repeat([_WILD * sigma_position, _WILD * sigma_velocity], axes),
         sigma_velocity=speed,
-        drag=0.0,
+        drag=_DRAG if drags else 0.0,
         steady=_BIAS * sigma_velocity,
     )
 
@@ -106,6 +115,7 @@ def learn(
     speed: float,
     longest: float,
     floor: tuple[float, float],
+    drags: bool = False,
 ) -> Learnt:
     """Learn the figures that ``given`` leaves NaN, and the prior.
 
@@ -117,14 +127,14 @@ def learn(
         Figures that are known, and others to begin with.
     order, period
         Of the motion model.
-    speed, longest
+    speed, longest, drags
         As for `supposed`.
     floor
         Least standard deviations of positions and velocities: their resolution over √12.
     """
     sample = sample_of(observations)
     axes = sample.z.shape[1] // 2
-    prior = supposed(axes, *_usual(first), speed, longest)
+    prior = supposed(axes, *_usual(first), speed, longest, drags=drags)
     if len(sample.time) < 3 or not np.isfinite(first.position).any():
         return Learnt(first, prior)
     motion = _motion(first, axes, order, period)

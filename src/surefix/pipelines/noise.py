@@ -96,7 +96,7 @@ def settle_noise(
     model = min(tried, key=lambda name: sum(block.found.cost for block in tried[name]))
     blocks = tried[model]
     if options.several:
-        model, blocks = _learnt_best(tried, model, speed, longest)
+        model, blocks = _learnt_best(tried, model, speed, longest, drags=options.drags)
     sigma_position = np.full((len(sensors), 3), np.nan)
     sigma_velocity = np.full((len(sensors), 3), np.nan)
     density = np.zeros(len(axes))
@@ -152,7 +152,7 @@ def _blocks(
 
 
 def _learnt_best(
-    tried: dict[str, list[_Block]], plain: str, speed: float, longest: float
+    tried: dict[str, list[_Block]], plain: str, speed: float, longest: float, *, drags: bool
 ) -> tuple[str, list[_Block]]:
     """Learn under the likelier motion model; under both, where what is wrong may last or not.
 
@@ -175,7 +175,7 @@ def _learnt_best(
 
     likely = plain if len(tried) == 1 else max(tried, key=lambda name: fit(name, tried[name]))
     learnt = {
-        name: [_learnt(block, name, speed, longest) for block in tried[name]]
+        name: [_learnt(block, name, speed, longest, drags=drags) for block in tried[name]]
         for name in sorted({plain, likely})
     }
     if len(learnt) > 1:
@@ -183,7 +183,7 @@ def _learnt_best(
     return likely, learnt[likely]
 
 
-def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:
+def _learnt(block: _Block, model: str, speed: float, longest: float, *, drags: bool) -> _Block:
     """Let the figures of a block follow from what belongs to the track."""
     learnt = learn(
         block.observations,
@@ -194,6 +194,7 @@ def _learnt(block: _Block, model: str, speed: float, longest: float) -> _Block:
         speed=speed,
         longest=longest,
         floor=block.floor,
+        drags=drags,
     )
     return block._replace(found=learnt.figures, prior=learnt.prior)
 

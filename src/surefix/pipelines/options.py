@@ -76,6 +76,9 @@ class CleanOptions:
     latency
         What is done about fixes that are late against a velocity: ``report`` says so, ``remove``
         also takes the delay off their times (not in real time), ``ignore`` does not look.
+    drags
+        Look for fixes that wander off slowly beside velocities or another sensor. These must have
+        no bias and their times must be right: else good fixes are taken for a drag.
     settle_rows
         In real time: rows that frame, noise figures and height offsets are settled on before the
         first result, at least 10. Scalar series are settled on as many values, but no more than
@@ -103,6 +106,7 @@ class CleanOptions:
     every_s: float | None = None
     reorder_s: float = 10.0
     latency: Latency = "report"
+    drags: bool = False
     settle_rows: int = 20_000
     held: bool = True
 
@@ -163,8 +167,9 @@ class CleanOptions:
             raise OptionsError(f"reorder_s = {self.reorder_s}", "seconds, zero or more")
         if _number("settle_rows", self.settle_rows) < 10 or self.settle_rows % 1:
             raise OptionsError(f"settle_rows = {self.settle_rows}", "a whole number from 10 on")
-        if not isinstance(self.held, bool):
-            raise OptionsError(f"held = {self.held!r}", "true or false")
+        for name in ("held", "drags"):
+            if not isinstance(getattr(self, name), bool):
+                raise OptionsError(f"{name} = {getattr(self, name)!r}", "true or false")
         self.loss  # noqa: B018  # refuses constants that do not fit the method
 
     def __reduce__(self) -> tuple[object, ...]:
