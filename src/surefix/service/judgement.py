@@ -27,7 +27,8 @@ _MISSED: Final = 5.0  # usual intervals without an observation after which a sen
 _SHORTEST: Final = 3.0  # s … but never sooner …
 _UNKNOWN: Final = 10.0  # s … and after so long where the interval is not known
 _FEW: Final = 30  # observations from which on its record says something
-_NOISY: Final = 1.5  # times the declared noise
+_NOISY: Final = 1.5  # times the declared noise: noisy …
+_CALM: Final = 1.3  # … until it is less than this
 _LEANS: Final = 1.0  # standard deviations that a sensor leans to one side: biased …
 _UPRIGHT: Final = 0.5  # … until it leans less than this
 _REJECTED: Final = 0.3  # share of rejected observations: doubtful …
@@ -142,7 +143,7 @@ def _judged(heard: Heard, record: _Record, age: float, word: str) -> tuple[Valid
         return "invalid", f"{kept}: {share}"
     if record.rejected > (_ACCEPTED if word == "jumping" else _REJECTED):
         return "doubtful", f"jumping: {share}"
-    if record.innovation > _NOISY:
+    if record.innovation > (_CALM if word == "noisy" else _NOISY):
         return "doubtful", f"noisy: {record.innovation:.1f} × what was declared or settled"
     return "valid", ""
 
