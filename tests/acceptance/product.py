@@ -53,7 +53,7 @@ def surefix(*words: object) -> Done:
     sys.argv = ["surefix", *(str(word) for word in words)]
     try:
         with (
-            mock.patch.object(sys, "__unraisablehook__", lambda _: None),
+            mock.patch.object(sys, "__unraisablehook__"),
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
         ):
