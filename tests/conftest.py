@@ -6,7 +6,12 @@ from pathlib import Path
 import pytest
 
 import cluster
+from needs import tool
 
+_FLAGS = (
+    "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --hide-scrollbars "
+    "--disable-background-networking"
+)
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -23,6 +28,21 @@ def data() -> Path:
 def postgres():
     """A PostgreSQL server of our own; the test is skipped where it is not installed."""
     yield from cluster.cluster()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A headless Chromium; the test is skipped where it is not installed."""
+    webdriver = pytest.importorskip("selenium.webdriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = tool("chromium", "chromium-browser", "google-chrome")
+    for flag in _FLAGS.split():
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    service = webdriver.ChromeService(tool("chromedriver"))
+    driver = webdriver.Chrome(options=options, service=service)
+    yield driver
+    driver.quit()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -32,7 +32,7 @@ from surefix.cli_live import live
 from surefix.cli_locate import locate
 from surefix.cli_progress import over_bytes, over_runs
 from surefix.cli_review import review
-from surefix.cli_signals import obey
+from surefix.cli_signals import obeyed
 from surefix.cli_warmup import announced, warmup
 from surefix.errors import OptionsError, SurefixError
 
@@ -319,9 +319,13 @@ app.command()(warmup)
 def main() -> None:
     """Run the command line; every failure ends with one line and a non-zero exit."""
     _use_utf8()
-    obey()
+    with obeyed():
+        _run()
+
+
+def _run() -> None:
     try:
-        if not {"--help", "--version"} & {*sys.argv}:
+        if len(sys.argv) > 1 and not {"--help", "--version"} & {*sys.argv}:
             begin()
         code = app(standalone_mode=False)
         if code == _INTERRUPTED:

@@ -11,7 +11,6 @@ from functools import reduce
 from operator import xor
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest import mock
 
 import numpy as np
 import pandas as pd
@@ -44,19 +43,12 @@ class Done(NamedTuple):
 
 
 def surefix(*words: object) -> Done:
-    """Run a command in this process; a warning inside it is an internal error.
-
-    What other tests left behind may be finalised meanwhile: what that says is none of the command.
-    """
+    """Run a command in this process; a warning inside it is an internal error."""
     out, err = io.StringIO(), io.StringIO()
     before, code = sys.argv, 0
     sys.argv = ["surefix", *(str(word) for word in words)]
     try:
-        with (
-            mock.patch.object(sys, "__unraisablehook__"),
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-        ):
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             main()
     except SystemExit as end:
         code = int(end.code or 0)

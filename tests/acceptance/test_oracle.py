@@ -51,6 +51,7 @@ def test_it_stays_beside_the_oracle(name):
             at_most = bounds[0] if mode != "realtime" else bounds[1 if kind == "aided" else 2]
             assert merit.rmse_ratio < at_most, (kind, mode)
             honest = 1.0 if name in HEAVY else found[mode, ORACLE].merit.nees  # one log scatters
+            assert 0.7 < merit.nees < 1.4, (kind, mode)
             assert 0.8 < merit.nees / honest < 1.25, (kind, mode)
             assert merit.rejected_good_pct < (8.0 if name in HEAVY else 0.3), (kind, mode)
             if mode != "realtime" and name not in ("clean", *HEAVY):

@@ -106,11 +106,13 @@ def test_a_run_of_wrong_velocities_is_no_livelier_motion():
         for n in (2, 3):
             begun = estimate_noise(seen, UNKNOWN, order=n)
             found = learn(seen, UNKNOWN, begun, order=n, floor=TINY, **known).figures
-            fit.append([-begun.cost, likelihood(seen, found, order=n, **known)])
+            fit.append(
+                [-begun.cost, *(likelihood(seen, f, order=n, **known) for f in (begun, found))]
+            )
         steady, lively = fit
-        assert steady[1] - lively[1] > 100.0
-        fooled.append(lively[0] > steady[0])
-    assert fooled == [True, False]
+        assert steady[2] - lively[2] > 100.0
+        fooled.append([lively[i] > steady[i] for i in (0, 1)])
+    assert fooled == [[True, False], [False, False]]
 
 
 def test_wrong_velocities_do_not_make_the_motion_calmer():

@@ -1,7 +1,6 @@
 """The page in a real browser, at the size of a desk and of a phone."""
 
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from needs import tool
 from report.made import channel, cleaned, dive_result, straight
 from surefix.report.page import write_report
 from surefix.types import Cleaned
@@ -18,7 +16,6 @@ webdriver = pytest.importorskip("selenium.webdriver")
 pytest.importorskip("plotly")
 
 SIZES = {"desk": (1400, 900, False), "phone": (390, 844, True)}
-FLAGS = "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --hide-scrollbars"
 READY = "return document.documentElement.dataset.ready === 'true'"
 LOOK = """
 const drawn = [...document.querySelectorAll('figure')];
@@ -34,20 +31,6 @@ return {
   buttons: [...document.querySelectorAll('.modebar-btn')].map(b => b.dataset.title || ''),
 };
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium", "chromium-browser", "google-chrome")
-    for flag in FLAGS.split():
-        options.add_argument(flag)
-    options.add_argument("--disable-background-networking")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    service = webdriver.ChromeService(tool("chromedriver"))
-    driver = webdriver.Chrome(options=options, service=service)
-    yield driver
-    driver.quit()
 
 
 def _open(browser: Any, place: Path, size: str) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from needs import tool
 from service.test_station import recorded
 from service.web_made import OPERATOR, TOKENS, VIEWER, served, voyage
 from surefix.service.alarms import active, raised
@@ -16,7 +15,6 @@ from surefix.service.sensors import SensorState
 webdriver = pytest.importorskip("selenium.webdriver")
 keys = pytest.importorskip("selenium.webdriver.common.keys").Keys
 
-FLAGS = "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --hide-scrollbars"
 SIZES = {"desk": (1400, 900), "tablet": (820, 1180), "small tablet": (768, 1024)}
 STATE = """
 const marks = [...document.querySelectorAll('#plan .trace')].length;
@@ -32,20 +30,6 @@ return {
     .map((e) => e.getBoundingClientRect().right)),
 };
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium", "chromium-browser", "google-chrome")
-    for flag in [*FLAGS.split(), "--disable-background-networking"]:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(
-        options=options, service=webdriver.ChromeService(tool("chromedriver"))
-    )
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")

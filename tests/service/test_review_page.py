@@ -6,14 +6,12 @@ import time
 import pytest
 
 from acceptance.product import surefix
-from needs import tool
 from service.reviewed import WILD, begun, log
 from surefix.io.edits import read_edits, standing
 from surefix.service.review_server import open_server
 
 webdriver = pytest.importorskip("selenium.webdriver")
 
-FLAGS = "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --hide-scrollbars"
 SIZES = {"desk": (1400, 900), "tablet": (820, 1180)}
 PLACE = """
 const [plot, along, up] = arguments, p = document.getElementById(plot), l = p._fullLayout;
@@ -32,20 +30,6 @@ return {
     .filter(b => !(b.textContent.trim() || b.getAttribute('aria-label'))).length,
 };
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium", "chromium-browser", "google-chrome")
-    for flag in [*FLAGS.split(), "--disable-background-networking"]:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(
-        options=options, service=webdriver.ChromeService(tool("chromedriver"))
-    )
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture

@@ -6,9 +6,6 @@ import os
 import socket
 import time
 
-import pytest
-
-from surefix.errors import InputError, OutputError
 from surefix.service.addresses import INPUTS, OUTPUTS, address
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
@@ -135,21 +132,6 @@ def test_clients_come_and_go():
                 assert listening.line.connected
                 writer.close()
                 await wait_for(lambda: not listening.line.connected)
-
-    asyncio.run(run())
-
-
-def test_a_port_that_is_taken_is_told():
-    async def run():
-        with socket.socket() as taken:
-            taken.bind(("127.0.0.1", 0))
-            taken.listen()
-            port = taken.getsockname()[1]
-            line = Line(address(f"tcp-listen://127.0.0.1:{port}", INPUTS))
-            with pytest.raises(InputError, match="in use"):
-                await listen(0, line, Inbox())
-            with pytest.raises(OutputError, match="in use"):
-                await open_output(address(f"tcp-listen://127.0.0.1:{port}", OUTPUTS))
 
     asyncio.run(run())
 

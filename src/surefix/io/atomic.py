@@ -15,7 +15,7 @@ from surefix.errors import OutputError
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["replacing"]
+__all__ = ["replacing", "told_by_name"]
 
 
 @contextlib.contextmanager
@@ -34,7 +34,7 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
     place = Path(path)
     draft = place.with_name(f".{place.name}.{secrets.token_hex(4)}.part")
     try:
-        with _named(place):
+        with told_by_name(place):
             if place.is_dir():
                 raise IsADirectoryError(0, "it is a directory")
             file = _Draft(draft, place)
@@ -44,7 +44,7 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         finally:
             with contextlib.suppress(OutputError):
                 file.close()
-        with _named(place):
+        with told_by_name(place):
             draft.replace(place)
             _sync_directory(place.parent)
     finally:
@@ -60,22 +60,29 @@ class _Draft(io.BufferedWriter):
         self._place = place
 
     def write(self, data: ReadableBuffer, /) -> int:
-        with _named(self._place):
+        with told_by_name(self._place):
             return super().write(data)
 
     def sync(self) -> None:
         """Bring everything to the disk."""
-        with _named(self._place):
+        with told_by_name(self._place):
             self.flush()
             os.fsync(self.fileno())
 
     def close(self) -> None:
-        with _named(self._place):
+        with told_by_name(self._place):
             super().close()
 
 
 @contextlib.contextmanager
-def _named(place: Path) -> Iterator[None]:
+def told_by_name(place: Path) -> Iterator[None]:
+    """Tell failures of the system as those of a file.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
     try:
         yield
     except OSError as error:

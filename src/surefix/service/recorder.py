@@ -20,7 +20,7 @@ import pyarrow.ipc
 import pyarrow.parquet as pq
 
 from surefix.errors import OutputError
-from surefix.io.atomic import replacing
+from surefix.io.atomic import replacing, told_by_name
 from surefix.io.records import Batch, Form, table
 from surefix.io.write_csv import write_table
 from surefix.io.write_parquet import table_sink
@@ -50,7 +50,7 @@ class Recorder:
         self.trouble = ""
         """Why the last rows are not in it, in words; they wait."""
         self._kind: _Csv | _Arrow = (_Csv if place.suffix == ".csv" else _Arrow)(place)
-        with _named(place):
+        with told_by_name(place):
             have = self._kind.begin()
         self._total, self._skip, self._have = before, max(have - before, 0), have
         self.missing = max(before - have, 0)
@@ -74,7 +74,7 @@ class Recorder:
         """All that is in the journal was given: a file that knows more is of another mission."""
         if not self._total and self._have:
             aside = f"{self.place.name}.before-{time.strftime('%Y%m%dT%H%M%S')}"
-            with _named(self.place):
+            with told_by_name(self.place):
                 self._kind.put_aside(aside)
         self._skip = 0
 
@@ -83,7 +83,7 @@ class Recorder:
         if not self._waiting:
             return
         try:
-            with _named(self.place):
+            with told_by_name(self.place):
                 self._kind.write(pa.concat_tables(self._waiting))
         except OutputError as error:
             self.trouble = str(error)
@@ -102,7 +102,7 @@ class Recorder:
         self.flush()
         if self.trouble:
             raise OutputError(self.trouble, "a place that can be written to")
-        with _named(self.place):
+        with told_by_name(self.place):
             self._kind.finish()
 
 
@@ -236,13 +236,3 @@ def _appending(place: Path, size: int) -> Iterator[BinaryIO]:
             with contextlib.suppress(OSError):
                 file.truncate(size)
             raise
-
-
-@contextlib.contextmanager
-def _named(place: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(
-            f"{place}: {error.strerror or error}", "a place that can be written to"
-        ) from error

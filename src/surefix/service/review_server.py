@@ -12,7 +12,7 @@ import uvicorn
 from surefix.errors import OutputError
 from surefix.service.review import Review
 from surefix.service.review_app import review_app
-from surefix.service.web_guard import Guard, WebState
+from surefix.service.web_guard import Guard, WebState, cut
 from surefix.service.web_options import Token, WebOptions
 from surefix.service.web_pages import pages
 
@@ -70,9 +70,7 @@ class ReviewServer:
         self._server.should_exit = True
 
     def _cut(self, client: tuple[str, int]) -> None:
-        for connection in list(self._server.server_state.connections):
-            if getattr(connection, "client", None) == client:
-                connection.transport.abort()
+        cut(self._server.server_state.connections, client)
 
 
 def open_server(review: Review, name: str, command: str, port: int = 0) -> ReviewServer:

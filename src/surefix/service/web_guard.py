@@ -11,7 +11,7 @@ import asyncio
 import json
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final, NamedTuple, TypeVar
@@ -20,7 +20,7 @@ from surefix.service.web_access import host_known, origin_known, role_of
 from surefix.service.web_limits import Turns
 from surefix.service.web_options import WebOptions
 
-__all__ = ["HEADERS", "OPEN", "Guard", "WebState"]
+__all__ = ["HEADERS", "OPEN", "Guard", "WebState", "cut"]
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -234,3 +234,18 @@ class Guard:
 
 def _encoded(headers: Mapping[str, str]) -> list[tuple[bytes, bytes]]:
     return [(name.encode(), value.encode()) for name, value in headers.items()]
+
+
+def cut(connections: Iterable[Any], client: tuple[str, int]) -> None:
+    """Cut at once what a client, (host, port), has open.
+
+    Parameters
+    ----------
+    connections
+        Those of a server, each with the client at its other end and a transport.
+    client
+        As a request names it.
+    """
+    for connection in list(connections):
+        if getattr(connection, "client", None) == client:
+            connection.transport.abort()

@@ -17,7 +17,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from surefix.errors import OutputError
 from surefix.service.inbox import Arrived
 from surefix.service.web_app import web_app
-from surefix.service.web_guard import Guard, WebState
+from surefix.service.web_guard import Guard, WebState, cut
 from surefix.service.web_hub import Hub
 from surefix.service.web_metrics import Metrics
 from surefix.service.web_options import WebOptions
@@ -104,9 +104,7 @@ class Web:
         self._server.should_exit = True
 
     def _cut(self, client: tuple[str, int]) -> None:
-        for connection in list(self._server.server_state.connections):
-            if getattr(connection, "client", None) == client:
-                connection.transport.abort()
+        cut(self._server.server_state.connections, client)
 
 
 def open_web(live: Live, options: WebOptions, clock: Callable[[], float] = time.time) -> Web:
