@@ -9,7 +9,6 @@ from surefix.service.alarms import (
     Cause,
     acknowledged,
     active,
-    as_text,
     changed,
     cleared,
     forgotten,
@@ -17,6 +16,7 @@ from surefix.service.alarms import (
     raised,
     up_to_date,
 )
+from surefix.service.noted import as_text
 
 STALE = Cause("warning", "stale: nothing since 12:00:00.0")
 

@@ -193,6 +193,36 @@ def test_looking_back_and_coming_back(browser, service):
     assert page.complaints() == []
 
 
+def test_what_was_wrong_then_is_shown_and_what_is_wrong_now_stays(tmp_path, browser):
+    with served(tmp_path, rows=0) as service:
+        service.sail(list(voyage(95)))
+        quiet = service.now
+        service.silence(40)
+        lasting = len(active(service.live.alarms))
+        assert lasting > 0
+        page = Page(browser, service).drawn()
+        page.until(f"document.querySelectorAll('#alarm-list .alarm').length === {lasting}")
+        assert page("document.querySelector('#then').hidden")
+        assert "invalid" in page.text("#sensors")
+        page.focus_by_tab("#travel")
+        page.press(*[keys.PAGE_DOWN] * 5)
+        page.until("!document.querySelector('#then').hidden")
+        moment = float(page("document.querySelector('#travel').value"))
+        assert moment < quiet
+        assert "None." in page.text("#then")
+        cards = page("[...document.querySelectorAll('.card')].map((c) => c.dataset.validity)")
+        assert cards == ["valid", "valid"]
+        assert page.text("#sensors-when").startswith("at ")
+        assert page("document.querySelectorAll('#alarm-list .alarm button').length") == lasting
+        page.press(keys.END)  # the newest there is: the alarms of then are those of now
+        page.until(f"document.querySelectorAll('#then-list .alarm').length === {lasting}")
+        assert page("document.querySelectorAll('#then-list button').length") == 0
+        page.focus_by_tab("#live")
+        page.press(keys.SPACE)
+        page.until("document.querySelector('#then').hidden")
+        assert page.complaints() == []
+
+
 def test_new_fixes_are_drawn_as_they_come(tmp_path, browser):
     with served(tmp_path, rows=100) as service:
         page = Page(browser, service).drawn()

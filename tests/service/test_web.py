@@ -15,7 +15,7 @@ from websockets.sync.client import connect as listen
 from service.test_live import options_in
 from service.test_station import recorded
 from service.test_transport import free_port, wait_for
-from service.web_made import OPERATOR, TOKENS, VIEWER, served, web_options
+from service.web_made import OPERATOR, TOKENS, VIEWER, served, voyage, web_options
 from surefix.errors import OutputError
 from surefix.io.journal import open_journal
 from surefix.service.alarms import raised
@@ -70,6 +70,30 @@ def test_the_past_is_what_was_cleaned(service):
     assert 2 <= len(kept) < total == len(kept) + part["rows"]["omitted"]
     assert min(part["rows"]["time"]) >= since
     assert max(part["rows"]["time"]) <= until
+
+
+def test_what_was_wrong_then_is_told_with_the_past(tmp_path):
+    """A receiver is silent for half a minute and comes back."""
+    with served(tmp_path, rows=0) as service:
+        service.sail(list(voyage(95)))
+        lost = service.now
+        service.silence(30)
+        back = service.now
+        service.sail(list(voyage(200))[125:])
+        client = service.client()
+
+        def then(moment):
+            said = client.get("/api/track", params={"since": moment - 60.0, "until": moment}).json()
+            return {each["quantity"]: each["validity"] for each in said["sensors"]}, said["alarms"]
+
+        assert then(lost - 1.0) == ({"position": "valid", "heading": "valid"}, [])
+        sensors, alarms = then(back)
+        assert sensors == {"position": "invalid", "heading": "invalid"}
+        assert all(each["gone"] is None for each in alarms)
+        assert {each["concerns"] for each in alarms} >= {"position"}
+        sensors, alarms = then(service.now)
+        assert sensors["position"] == "valid"
+        assert all(each["gone"] > back for each in alarms)  # over, and nobody has seen them
 
 
 @pytest.mark.parametrize("query", ["since=x", "since=nan", "until=inf", "most=0", "most=1e9"])
@@ -269,6 +293,8 @@ def test_the_whole_service_serves_until_it_is_stopped_and_remembers(tmp_path):
     again = begin_live(options)
     assert again.history.take(again.history.since(0)).tobytes() == rows.tobytes()
     assert again.history.sensors == live.history.sensors
+    for moment in rows["time"][::20]:
+        assert repr(again.past.at(moment)) == repr(live.past.at(moment))
     again.journal.close()
     journal = open_journal(options.journal, new=False)
     assert sum(each.kind == "rows" for each in journal.told()) > 0

@@ -92,7 +92,8 @@ class Told(NamedTuple):
     time
         s, Unix, of validity.
     kind, text
-        ``nmea``, ``rows`` (of the track, packed), ``event`` or ``alarm``, and what was said.
+        ``nmea``, ``rows`` (of the track, packed), ``event``, ``alarm`` or ``sensor``, and what was
+        said.
     """
 
     number: int

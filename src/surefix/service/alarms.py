@@ -7,10 +7,11 @@ been acknowledged. A cause that comes back makes a new alarm.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
+
+from surefix.service.noted import as_text, from_text
 
 __all__ = [
     "Alarm",
@@ -18,7 +19,6 @@ __all__ = [
     "Priority",
     "acknowledged",
     "active",
-    "as_text",
     "changed",
     "cleared",
     "forgotten",
@@ -166,29 +166,13 @@ def changed(before: Alarms, after: Alarms) -> Alarms:
     return tuple(each for each in after if old.get(each.number) != as_text(each))
 
 
-def as_text(alarm: Alarm) -> str:
-    """An alarm as JSON, for the journal; unknown times are null."""
-    plain = {
-        name: None if isinstance(value, float) and math.isnan(value) else value
-        for name, value in alarm._asdict().items()
-    }
-    return json.dumps(plain, ensure_ascii=False)
-
-
 def from_texts(texts: Iterable[str], now: float) -> Alarms:
     """The alarms from what the journal says of them: the last text about each counts.
 
     A text that is none of an alarm is passed over.
     """
-    found: dict[int, Alarm] = {}
-    for text in texts:
-        try:
-            plain = json.loads(text)
-            known: dict[str, Any] = {k: math.nan if v is None else v for k, v in plain.items()}
-            alarm = Alarm(**known)
-        except (TypeError, ValueError, AttributeError):
-            continue
-        found[alarm.number] = alarm
+    read = (from_text(text, Alarm) for text in texts)
+    found = {each.number: each for each in read if each is not None}
     return forgotten(tuple(found[number] for number in sorted(found)), now)
 
 

@@ -13,23 +13,20 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from surefix.errors import InputError, OutputError
 from surefix.io.journal import Journal, Received, Told, open_journal
 from surefix.io.write_nmea import sentences
-from surefix.service import alarms as alarm
 from surefix.service.alarms import Alarm
-from surefix.service.causes import Condition, causes
 from surefix.service.history import History, packed, unpacked
 from surefix.service.inbox import Arrived, Inbox
 from surefix.service.inputs import Line, listen
-from surefix.service.judgement import judge_sensors
 from surefix.service.keeper import Gap, Keeper
 from surefix.service.options import LiveOptions, OutputOptions
 from surefix.service.outputs import Output, open_output
+from surefix.service.past import Note, Past
 from surefix.service.recorder import Recorder
 from surefix.service.sensors import SensorState
 from surefix.service.station import (
@@ -44,10 +41,11 @@ from surefix.service.station import (
     stored,
 )
 from surefix.service.steady import SteadyClock
+from surefix.service.supervision import heed, judge, remember, tell_gap
 from surefix.service.telling import epoch_of
 from surefix.types import Cleaned
 
-__all__ = ["Live", "acknowledge", "begin_live", "run_live", "step"]
+__all__ = ["Live", "begin_live", "run_live", "step"]
 
 _TICK: Final = 1.0  # s without a fix after which the track is carried on by dead reckoning
 
@@ -76,6 +74,8 @@ class Live:
         Those that are open, and those that were closed not long ago.
     set_by
         s by which the computer's clock was set since the service began.
+    past, noted
+        How the sensors and the alarms were, and what was noted last of each sensor.
     history
         The last rows that were cleaned for good; as many as the web side keeps.
     watchers
@@ -102,8 +102,20 @@ class Live:
     shown_at: float = -math.inf
     begun: tuple[int, float] = (0, -math.inf)  # fixes that were begun, and when that was looked at
     shed_at: float = -math.inf
+    past: Past = field(default_factory=Past)
+    noted: tuple[Note, ...] = ()
     history: History = field(default_factory=lambda: History(0))
     watchers: list[Callable[[Sequence[Arrived]], None]] = field(default_factory=list)
+
+    @property
+    def recorded(self) -> bool:
+        """Whether a recorded log is replayed, whose time is not the present one."""
+        return any(line.address.kind == "file" for line in self.lines)
+
+    def told(self, at: float, kind: str, text: str) -> Told:
+        """Number something that is put out, s, Unix; whoever asks puts it among the unwritten."""
+        self.said += 1
+        return Told(self.said, self.taken, at, kind, text)
 
     @property
     def unsaved(self) -> list[Received | Told]:
@@ -140,9 +152,9 @@ def begin_live(options: LiveOptions) -> Live:
     lines = [Line(each.address) for each in options.inputs]
     for source, size in _replayed(options, journal).items():
         lines[source].size = size
-    known = alarm.from_texts((each.text for each in journal.told("alarm")), time.time())
     live = Live(options, journal, Keeper(journal), station, lines, taken=taken, said=said)
-    live.recorders, live.alarms = recorders, known
+    live.recorders = recorders
+    remember(live, time.time())
     if options.web is not None:
         live.history = History(options.web.history_rows)
         live.history.sensors = station.session.sensors
@@ -218,9 +230,9 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
     live.station, batches = receive(live.station, received)
     for recorder in live.recorders:
         recorder.add(batches)
-    told = [_told(live, *what) for what in _events(batches)]
+    told = [live.told(*what) for what in _events(batches)]
     if live.options.web is not None and len(rows := live.history.add(batches)):
-        told.append(_told(live, float(rows["time"][-1]), "rows", packed(rows)))
+        told.append(live.told(float(rows["time"][-1]), "rows", packed(rows)))
     known = _latest(live, now, fresh=bool(received))
     fresh: list[tuple[Output, bytes]] = []
     if known is not None and (live.now is None or known.time > live.now.time):
@@ -228,62 +240,18 @@ async def step(live: Live, arrived: Sequence[Arrived], now: float) -> None:
         epoch = epoch_of(known)
         for wanted, output in live.outputs:
             text = sentences(epoch, talker=wanted.talker, types=wanted.sentences)
-            told.append(_told(live, known.time, "nmea", text.decode("ascii")))
+            told.append(live.told(known.time, "nmea", text.decode("ascii")))
             fresh.append((output, text))
     live.unwritten += [*received, *told]
-    _judge(live, now)
+    judge(live, now)
     trouble = live.keeper.trouble
     await _write(live, now)
     if live.keeper.trouble != trouble:
-        _heed(live, now)
+        heed(live, now)
     for output, text in fresh:
         output.send(text)
     for watch in live.watchers:
         watch(arrived)
-
-
-def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
-    """Tell that a person has seen an alarm; False if there is none of that number to be seen.
-
-    The journal has it with the next step, a second later at most.
-
-    Parameters
-    ----------
-    live
-        The service.
-    number
-        Of the alarm.
-    by
-        Who has seen it.
-    now
-        s, Unix.
-    """
-    before = live.alarms
-    _set_alarms(live, alarm.acknowledged(before, number, by, now), now)
-    return live.alarms != before
-
-
-def _judge(live: Live, now: float) -> None:
-    """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
-    session = live.station.session if live.ahead is None else live.ahead.session
-    inputs = [(each.name, each.role) for each in live.options.inputs]
-    at = math.nan if _recorded(live) else now
-    live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
-    _heed(live, now)
-
-
-def _heed(live: Live, now: float) -> None:
-    """Raise alarms for what is wrong, and clear those whose cause is gone."""
-    condition = Condition(now, live.now, live.keeper.trouble, live.shed_at, live.set_by)
-    found = causes(live.sensors, condition, live.options.alarms)
-    _set_alarms(live, alarm.up_to_date(live.alarms, found, now), now)
-
-
-def _set_alarms(live: Live, after: tuple[Alarm, ...], now: float) -> None:
-    """Take over alarms, and tell the journal of those that are not what they were."""
-    for each in alarm.changed(live.alarms, after):
-        live.unwritten.append(_told(live, now, "alarm", alarm.as_text(each)))
-    live.alarms = after
 
 
 def _gaps(live: Live) -> None:
@@ -291,7 +259,7 @@ def _gaps(live: Live) -> None:
     for each in live.recorders:
         if each.missing:
             text = f"note: {each.place} lacks {each.missing} rows before these"
-            live.unwritten.append(_told(live, math.nan, "event", text))
+            live.unwritten.append(live.told(math.nan, "event", text))
 
 
 def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
@@ -308,20 +276,10 @@ def _latest(live: Live, now: float, *, fresh: bool) -> Latest | None:
     if known is not None and not known.time <= live.fixed_at[0]:
         live.fixed_at = known.time, now
     behind = live.now is not None and (known is None or known.time <= live.now.time)
-    if not behind or now - live.shown_at < _TICK or _recorded(live):
+    if not behind or now - live.shown_at < _TICK or live.recorded:
         return known
     newest, seen = live.fixed_at
     return look_ahead(live.station, newest + now - seen).shown
-
-
-def _recorded(live: Live) -> bool:
-    """Whether a recorded log is replayed, whose time is not the present one."""
-    return any(line.address.kind == "file" for line in live.lines)
-
-
-def _told(live: Live, at: float, kind: str, text: str) -> Told:
-    live.said += 1
-    return Told(live.said, live.taken, at, kind, text)
 
 
 def _events(batches: Sequence[Cleaned]) -> list[tuple[float, str, str]]:
@@ -348,7 +306,7 @@ def _noticed(live: Live, inbox: Inbox, now: float) -> None:
     """Say that more came than could be taken."""
     if inbox.shed:
         text = f"{inbox.shed} bytes came faster than they could be taken; the oldest were given up"
-        live.unwritten.append(_told(live, now, "event", f"overload: {text}"))
+        live.unwritten.append(live.told(now, "event", f"overload: {text}"))
         live.shed_at, inbox.shed = now, 0
 
 
@@ -368,15 +326,6 @@ async def _write(live: Live, now: float, *, whole: bool = False) -> None:
 
     if await keeper.keep(records, snapshot, last=whole) and keeper.gap.pieces:
         gap, keeper.gap = keeper.gap, Gap()
-        known = alarm.raised(live.alarms, "mission", "warning", _missing(gap), now)
-        _set_alarms(live, alarm.cleared(known, "mission", now), now)
+        tell_gap(live, gap, now)
         if whole:
             await keeper.keep(live.unwritten, last=True)
-
-
-def _missing(gap: Gap) -> str:
-    text = f"gap: the journal was away, {gap.size} bytes of the mission are not in it"
-    if math.isnan(gap.first):
-        return text
-    first, last = (f"{datetime.fromtimestamp(at, UTC):%Y-%m-%dT%H:%M:%SZ}" for at in gap[2:])
-    return f"{text}, of {first} to {last}"

@@ -11,7 +11,7 @@ from fastapi import FastAPI, HTTPException, Query, Request, Response, WebSocket
 from pydantic import BaseModel
 
 from surefix.io.journal import Told
-from surefix.service.live import acknowledge
+from surefix.service.supervision import acknowledge
 from surefix.service.web_access import SESSION_S, Role, cookie_name, session
 from surefix.service.web_file import file_answer
 from surefix.service.web_hub import Hub
@@ -80,7 +80,7 @@ def web_app(
     ) -> Response:
         """Give the past from ``since`` until ``until``, s, in about ``most`` rows."""
         async with looking:
-            record = await track_record(live.history, since, until, most)
+            record = await track_record(live, since, until, most)
             text = await asyncio.to_thread(record.model_dump_json)
         return Response(text, media_type=_JSON)
 

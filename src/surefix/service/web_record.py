@@ -15,8 +15,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from surefix.reasons import texts
-from surefix.service.alarms import active
-from surefix.service.history import History, Rows, shown, verdicts_of
+from surefix.service.alarms import Alarm, active
+from surefix.service.history import Rows, shown, verdicts_of
+from surefix.service.sensors import SensorState
 from surefix.types import FloatArray, IntArray, Verdict
 
 if TYPE_CHECKING:
@@ -158,6 +159,8 @@ class TrackRecord(BaseModel):
     first: float = Field(description="s, Unix, of the oldest row that is kept")
     last: float = Field(description="s, Unix, of the newest")
     rows: RowsRecord
+    sensors: list[SensorRecord] = Field(description="as they were judged at the end of the span")
+    alarms: list[AlarmRecord] = Field(description="those that were to be shown at the end of it")
 
 
 def state_record(live: Live, now: float, rows: RowsRecord) -> StateRecord:
@@ -178,8 +181,8 @@ def state_record(live: Live, now: float, rows: RowsRecord) -> StateRecord:
         time=now,
         present=live.now.time if live.now is not None and replayed else now,
         position=None if live.now is None else _position(live.now),
-        sensors=[SensorRecord(**each._asdict()) for each in live.sensors],
-        alarms=[AlarmRecord(**each._asdict()) for each in active(live.alarms)],
+        sensors=_sensors(live.sensors),
+        alarms=_alarms(active(live.alarms)),
         inputs=[
             LineRecord(name=each.name, **vars(line) | {"address": str(line.address)})
             for each, line in named
@@ -245,13 +248,25 @@ def rows_record(rows: Rows, numbers: IntArray, sensors: Sequence[str], most: int
     )
 
 
-async def track_record(history: History, since: float, until: float, most: int) -> TrackRecord:
+async def track_record(live: Live, since: float, until: float, most: int) -> TrackRecord:
     """Make the record of a span of the past, s, its ends included, beside the loop."""
+    history = live.history
     first, last = history.span()
+    sensors, alarms = live.past.at(until)
     numbers = history.between(since, until)
     given = history.take(numbers), numbers, history.sensors, most
     rows = await asyncio.to_thread(rows_record, *given)
-    return TrackRecord(first=first, last=last, rows=rows)
+    return TrackRecord(
+        first=first, last=last, rows=rows, sensors=_sensors(sensors), alarms=_alarms(alarms)
+    )
+
+
+def _sensors(states: Sequence[SensorState]) -> list[SensorRecord]:
+    return [SensorRecord(**each._asdict()) for each in states]
+
+
+def _alarms(alarms: Sequence[Alarm]) -> list[AlarmRecord]:
+    return [AlarmRecord(**each._asdict()) for each in alarms]
 
 
 def _rounded(values: FloatArray, digits: int) -> Vector:

@@ -20,17 +20,23 @@ const acknowledge = async (number, button) => {
   button.removeAttribute("aria-busy");
 };
 
-const begin = (alarm) => {
+const blank = () => {
   const item = make("li.alarm");
   const words = make("div");
   words.append(make("b.priority"), make("span.text"), make("small"));
-  const button = make("button", "Acknowledge", { type: "button" });
-  button.addEventListener("click", () => acknowledge(alarm.number, button));
-  item.append(make("span.sign", "", { "aria-hidden": "true" }), words, button);
+  item.append(make("span.sign", "", { "aria-hidden": "true" }), words);
   return item;
 };
 
-const fill = (item, alarm, role) => {
+const begin = (alarm) => {
+  const item = blank();
+  const button = make("button", "Acknowledge", { type: "button" });
+  button.addEventListener("click", () => acknowledge(alarm.number, button));
+  item.append(button);
+  return item;
+};
+
+const describe = (item, alarm) => {
   const seen = known(alarm.seen);
   const gone = known(alarm.gone);
   item.dataset.priority = alarm.priority;
@@ -41,11 +47,15 @@ const fill = (item, alarm, role) => {
   const ended = gone ? `over since ${clock(alarm.gone)}` : "lasts";
   const by = seen ? `, acknowledged ${clock(alarm.seen)} by ${alarm.by}` : "";
   say(item.querySelector("small"), `since ${clock(alarm.since)}, ${ended}${by}`);
+};
+
+const fill = (item, alarm, role) => {
+  describe(item, alarm);
   const button = item.querySelector("button");
   button.setAttribute("aria-label", `Acknowledge ${alarm.concerns}: ${alarm.text}`);
   button.title = role === "operator" ? "" : "Only operators may";
   button.disabled = role !== "operator";
-  button.hidden = seen;
+  button.hidden = known(alarm.seen);
 };
 
 /** Show the alarms of a record; `role` is who looks. */
@@ -62,4 +72,13 @@ export const showAlarms = (alarms, role) => {
   if (!focused || (list.contains(still) && still.checkVisibility())) return;
   const next = [...list.querySelectorAll("button:enabled")].find((button) => !button.hidden);
   (next ?? section).focus();
+};
+
+/** Show which alarms there were at a moment that is looked back to, s; null: none is. */
+export const showThen = (alarms, moment) => {
+  document.getElementById("then").hidden = alarms === null;
+  if (alarms === null) return;
+  say(document.getElementById("then-when"), clock(moment));
+  document.getElementById("no-then").hidden = alarms.length > 0;
+  keyed(document.getElementById("then-list"), alarms, (alarm) => alarm.number, blank, describe);
 };

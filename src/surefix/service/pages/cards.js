@@ -31,12 +31,12 @@ const fill = (card, sensor, now) => {
     ["Latency", figure(sensor.latency, 2, "s")],
     ["Rejected", share(sensor.rejected)],
     ["Innovation", figure(sensor.innovation, 2, "σ")],
-    ["Last", known(sensor.observed) ? ago(now - sensor.observed) : "–"],
+    ["Last", known(now) && known(sensor.observed) ? ago(now - sensor.observed) : "–"],
     ["Input", sensor.input],
   ]);
 };
 
-/** Show the sensors of a record. `now` is the time that ages count to, s. */
+/** Show the sensors of a record. `now` is the time that ages count to, s; null: it is not known. */
 export const showSensors = (sensors, now) => {
   document.getElementById("no-sensors").hidden = sensors.length > 0;
   const list = document.getElementById("sensors");

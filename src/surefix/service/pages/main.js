@@ -1,6 +1,6 @@
 // The dashboard: it shows what the service says, and decides nothing.
 
-import { showAlarms } from "./alarms.js";
+import { showAlarms, showThen } from "./alarms.js";
 import { say, terms } from "./build.js";
 import { showLines, showSensors } from "./cards.js";
 import { ask, listen, track } from "./link.js";
@@ -23,7 +23,7 @@ const page = {
   heard: true, // whether the stream is heard now
   first: null, // s, oldest row that is kept
   live: [], // rows of the window that ends now
-  past: null, // {moment, rows} looked at; null: live
+  past: null, // {moment, rows, sensors, alarms} looked at; null: live
   marks: null,
 };
 
@@ -88,9 +88,12 @@ const showRecord = () => {
   showPosition();
   if (!record) return;
   showAlarms(record.alarms, page.role);
-  showSensors(record.sensors, record.present);
+  const then = page.past?.sensors ? page.past : null; // there once it was answered
+  showThen(then?.alarms ?? null, then?.answered);
+  if (then) showSensors(then.sensors, null);
+  else showSensors(record.sensors, record.present);
+  say(at("sensors-when"), then ? `at ${clock(then.answered)}` : "");
   showLines(record);
-  say(at("sensors-when"), page.past ? "at present" : "");
 };
 
 // What is drawn
@@ -150,14 +153,15 @@ let settling = 0;
 const look = async (moment) => {
   const said = await track(moment - span(), moment);
   if (page.past?.moment !== moment) return; // moved on meanwhile
-  page.past.rows = unpack(said.rows);
+  const { sensors, alarms } = said;
+  Object.assign(page.past, { rows: unpack(said.rows), sensors, alarms, answered: moment });
   page.first = said.first;
   showRecord();
   redraw(true);
 };
 
 const travelTo = (moment) => {
-  page.past = { moment, rows: page.past?.rows ?? page.live };
+  page.past = { rows: page.live, ...page.past, moment };
   showTravel();
   showStatus();
   clearTimeout(settling);
