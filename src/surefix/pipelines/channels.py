@@ -9,8 +9,9 @@ import numpy as np
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
 from surefix.filters.health import Health, no_health, watch
+from surefix.filters.liveliness import Lively, begin_lively, follow
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
-from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.records import Epochs, Estimate, Motion, Recovery
 from surefix.filters.track import by_axis
 from surefix.geo.angle import wrap
 from surefix.models.motion import MODELS
@@ -49,6 +50,7 @@ class ChannelState(NamedTuple):
     sigma: float = 1.0
     noise: tuple[Noise, ...] = ()
     filter: FilterState | None = None
+    lively: Lively | None = None
     health: Health = no_health(1)
 
     def nothing(self) -> Channel:
@@ -111,7 +113,8 @@ def clean_channel(
     z = np.clip(np.where(status.verdict < 0, raw, np.nan), -FARTHEST, FARTHEST)
     if state.motion is None:
         state = _settle(state, new, tau[head], z[head], options)
-    assert state.motion is not None
+    motion = state.motion
+    assert motion is not None
     assert state.filter is not None
     n = len(raw)
     epochs = Epochs(
@@ -121,17 +124,8 @@ def clean_channel(
         np.full((n, 2), np.nan),
         np.zeros(n, np.int64),
     )
-    after, estimated = estimate(
-        options,
-        state.motion,
-        state.recovery,
-        None,
-        state.lag,
-        epochs,
-        np.ones(n, np.bool_),
-        state.filter,
-    )
-    judged = verdicts(estimated, epochs, state.motion, status, (0,), several=False)
+    state, estimated = _estimated(state, motion, state.filter, epochs, options)
+    judged = verdicts(estimated, epochs, motion, status, (0,), several=False)
     lost = (judged.weight < _LITTLE) & (estimated.sigma[:, 0] > _LOST * state.sigma)
     known = (estimated.sigma[:, 0] < UNKNOWN) & ~lost
     mean = np.where(known, estimated.mean[:, 0], np.nan)
@@ -147,7 +141,28 @@ def clean_channel(
         verdicts=judged,
         noise=state.noise,
     )
-    return cleaned, state._replace(filter=after, health=_watched(state.health, judged))
+    return cleaned, state._replace(health=_watched(state.health, judged))
+
+
+def _estimated(
+    state: ChannelState,
+    motion: Motion,
+    before: FilterState,
+    epochs: Epochs,
+    options: CleanOptions,
+) -> tuple[ChannelState, Estimate]:
+    """Let the filter take the epochs; in real time its process noise follows the series."""
+
+    def run(motion: Motion, epochs: Epochs, before: FilterState) -> tuple[FilterState, Estimate]:
+        wanted = np.ones(len(epochs.time), np.bool_)
+        return estimate(options, motion, state.recovery, None, state.lag, epochs, wanted, before)
+
+    if options.mode != "realtime":
+        after, found = run(motion, epochs, before)
+        return state._replace(filter=after), found
+    lively = state.lively or begin_lively(motion, 1)
+    after, lively, found, _ = follow(run, motion, ((0,),), lively, epochs, before, whole=True)
+    return state._replace(filter=after, lively=lively), found
 
 
 def _watched(health: Health, judged: Verdicts) -> Health:

@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.cleaning.duplicates import find_repeats
-from surefix.filters.records import Epochs, Estimate
-from surefix.pipelines.events import jump_events, run_events, sensor_events
+from surefix.filters.liveliness import Change, begin_lively, follow
+from surefix.filters.records import Epochs, Estimate, Motion
+from surefix.pipelines.events import jump_events, motion_events, run_events, sensor_events
 from surefix.pipelines.judge import (
+    FilterState,
     Status,
     by_velocity,
     estimate,
@@ -92,7 +94,8 @@ def _clean(
         np.concatenate([lost, none])[order],
         np.concatenate([rows.time, grid])[order],
     )
-    session, found = _estimated(replace(session, last_tau=float(tau[-1])), setup, all_rows)
+    session = replace(session, last_tau=float(tau[-1]))
+    session, found, changes = _estimated(session, setup, all_rows)
     judged = _judged(setup, all_rows, found)
     track = _track(setup, all_rows, found)
     row = np.flatnonzero(order < len(tau))
@@ -126,6 +129,7 @@ def _clean(
             *jump_events(judged),
             *run_events(*told, growing=options.mode == "realtime"),
             *health_events,
+            *motion_events(changes, track.time, setup.model),
         ),
         settings=settings(options, setup),
     )
@@ -133,26 +137,37 @@ def _clean(
 
 def _estimated(
     session: Session, setup: Setup, all_rows: _Epochs
-) -> tuple[Session, Estimate | None]:
+) -> tuple[Session, Estimate | None, tuple[Change, ...]]:
     """Let the filter, or an estimator in its place, take the epochs; none without any axis."""
     if session.filter is None:
-        return session, None
+        return session, None, ()
     if session.estimator is not None:
         memory, found = session.estimator(
             setup.motion, setup.recovery, all_rows.epochs, session.memory
         )
-        return replace(session, memory=memory), found
-    after, found = estimate(
-        session.options,
-        setup.motion,
-        setup.recovery,
-        setup.prior,
-        setup.lag,
-        all_rows.epochs,
-        ~all_rows.auxiliary,
-        session.filter,
+        return replace(session, memory=memory), found, ()
+
+    def run(motion: Motion, epochs: Epochs, state: FilterState) -> tuple[FilterState, Estimate]:
+        return estimate(
+            session.options,
+            motion,
+            setup.recovery,
+            setup.prior,
+            setup.lag,
+            epochs,
+            ~all_rows.auxiliary,
+            state,
+        )
+
+    given = session.options.process is not None
+    if session.options.mode != "realtime" or setup.prior is None or given:
+        after, found = run(setup.motion, all_rows.epochs, session.filter)
+        return replace(session, filter=after), found, ()
+    lively = session.lively or begin_lively(setup.motion, len(setup.blocks))
+    after, lively, found, changes = follow(
+        run, setup.motion, setup.blocks, lively, all_rows.epochs, session.filter, whole=False
     )
-    return replace(session, filter=after), found
+    return replace(session, filter=after, lively=lively), found, changes
 
 
 def _judged(setup: Setup, all_rows: _Epochs, found: Estimate | None) -> Verdicts:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from surefix.filters.health import SUSPECT, TRUSTED, Health, no_health, watch
+from surefix.filters.liveliness import Change
+from surefix.pipelines.noise import PROCESS_UNIT
 from surefix.reasons import vector
 from surefix.types import BoolArray, Event, FloatArray, IntArray, Reason, Verdict, Verdicts
 
-__all__ = ["jump_events", "run_events", "sensor_events"]
+__all__ = ["jump_events", "motion_events", "run_events", "sensor_events"]
 
 _TOLD_FROM = 3  # fixes of a run that are worth an event
 _JUDGED = (Verdict.USED, Verdict.DOWNWEIGHTED, Verdict.REJECTED)
@@ -55,6 +59,19 @@ def run_events(
             text = text if growing else f"{count} {text}"
             events.append(Event("run", float(time[k]), text))
     return events
+
+
+def motion_events(changes: Sequence[Change], time: FloatArray, model: str) -> list[Event]:
+    """Process noise that was raised; ``time`` (n,) of the epochs, and the motion model."""
+    return [
+        Event(
+            "noise-changed",
+            float(time[each.after]),
+            f"the motion is livelier than what was settled: its noise is {each.process:.3g}, no "
+            f"longer {each.before:.3g} {PROCESS_UNIT[model]}",
+        )
+        for each in changes
+    ]
 
 
 def sensor_events(

@@ -16,14 +16,15 @@ from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.rows import METRES_PER_DEGREE, Rows
 from surefix.types import BoolArray, FloatArray, Noise
 
-__all__ = ["Figures", "settle_noise"]
+__all__ = ["PROCESS_UNIT", "Figures", "settle_noise"]
 
 _MEMORY = 300.0  # observations by which noise is adapted in real time
 _LOOKED_AT = 50_000  # rows whose digits are looked at
 _SPEEDS = tuple(unit * digit for unit in (1.0, KNOT, KMH) for digit in (0.1, 0.01, 0.001))
 _COURSES = tuple(float(np.radians(digit)) for digit in (1.0, 0.1, 0.01))
 _FITS = 1e-6  # of a step, within which a value is a multiple of it
-_PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
+PROCESS_UNIT = {"cv": "m/s^1.5", "ca": "m/s^2.5"}
+"""Of the process noise of each motion model."""
 
 
 class Figures(NamedTuple):
@@ -319,4 +320,4 @@ def _named(block: _Block, sensors: list[str], model: str) -> list[Noise]:
     word = "vertical acceleration" if vertical else "acceleration"
     word = word.replace("acceleration", "jerk") if model == "ca" else word
     source = "given" if np.isfinite(given.process) else "estimated"
-    return [*out, Noise("motion", word, found.process, _PROCESS_UNIT[model], source)]
+    return [*out, Noise("motion", word, found.process, PROCESS_UNIT[model], source)]

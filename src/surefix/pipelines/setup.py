@@ -73,6 +73,13 @@ class Setup:
     noise: tuple[Noise, ...]
     events: tuple[Event, ...]
 
+    @property
+    def blocks(self) -> tuple[tuple[int, ...], ...]:
+        """Axes of the filter that share their process noise: the horizontal ones, the vertical."""
+        flat = tuple(k for k, axis in enumerate(self.axes) if axis != 2)
+        high = tuple(k for k, axis in enumerate(self.axes) if axis == 2)
+        return tuple(block for block in (flat, high) if block)
+
 
 def localise(
     rows: Rows, frame: LocalFrame | None, origin: FloatArray

@@ -10,6 +10,7 @@ import numpy as np
 
 from surefix.cleaning.duplicates import RepeatState
 from surefix.filters.health import Health
+from surefix.filters.liveliness import Lively
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery
 from surefix.pipelines.channels import ChannelState
 from surefix.pipelines.judge import FilterState
@@ -49,8 +50,9 @@ class Session:
         What is settled; None before.
     idle, repeats
         Axes that nobody measured, and what is known of fixes polled again; None before.
-    filter, health
-        Of the track, and the records of the sensors; None before.
+    filter, lively, health
+        Of the track, how its process noise follows in real time, and the records of the sensors;
+        None before.
     last_tau, next_grid
         Time of the last epoch, s, and number of the next regular time, if they are asked for.
     channels, arrived
@@ -71,6 +73,7 @@ class Session:
     idle: BoolArray | None = None
     repeats: RepeatState | None = None
     filter: FilterState | None = None
+    lively: Lively | None = None
     health: Health | None = None
     last_tau: float = -np.inf
     next_grid: int | None = None
