@@ -2,9 +2,10 @@
 
 A filter whose process noise is too small lags behind, and its innovations lean to one side for a
 while: each agrees in sign with the one before. Where the products of neighbouring innovations,
-which have no mean if all is well, are far above nought, the process noise is estimated anew on the
-last epochs; it is taken over if it is larger and the data clearly prefer it. It never falls: what
-has been lively may be so again, and too much costs little where too little costs the track.
+which have no mean if all is well, are far above nought, larger figures are tried on the last epochs
+under several hypotheses, so that a run of wrong fixes is not taken for motion. One that the data
+clearly prefer is taken over. It never falls: what has been lively may be so again, and too much
+costs little where too little costs the track.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from surefix.filters.noise import NoiseFigures, Observations, estimate_noise
+from surefix.filters.hypotheses import Prior, no_hypotheses
+from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.records import Epochs, Estimate, Motion
-from surefix.types import BoolArray, FloatArray, IntArray
+from surefix.filters.track import by_axis
+from surefix.types import FloatArray, IntArray
 
 __all__ = ["Change", "Lively", "begin_lively", "follow"]
 
@@ -25,10 +28,15 @@ _SCALES: Final = (1, 2, 4, 8)  # steps that are looked back over, each for itsel
 _FAR: Final = 5.0  # standard deviations of the sum of products that call for an estimate
 _WINDOW: Final = 120  # epochs it is made on
 _LARGEST: Final = 3.0  # no standardised innovation counts for more
-_LARGER: Final = 1.5  # factor of the standard deviation that is worth a change …
-_GAIN: Final = 6.0  # … with so much log-likelihood gained
-_PAUSE: Final = 20_000  # epochs between two looks that found nothing, at most
-_BELONGS: Final = 0.5  # an observation of less weight is not looked at
+_DOWN, _UP = 1e-8, 100.0  # far below and far above, as variances
+_COARSE: Final = 16.0  # factor between two densities that are tried …
+_FINE: Final = 1.5 ** np.array([-4.0, -2.0, 2.0, 4.0])  # … and those about the best of them
+_GAIN: Final = 10.0  # log-likelihood that is worth a change
+_BRIEFLY: Final = 16  # hypotheses that it is found with …
+_BEGIN: Final = 3  # … but for the first epochs
+_LOUDER: Final = 1.5  # after an estimate that changed nothing, factor on what calls for the next …
+_LOUDEST: Final = 60.0  # … standard deviations at most …
+_PAUSE: Final = 20_000  # … for so many epochs at most
 
 State = TypeVar("State")
 
@@ -59,9 +67,8 @@ class Lively(NamedTuple):
     ----------
     density
         (axes,) of the process noise, at present.
-    recent, used
-        The last epochs, their variances as adapted, and (n, m) whether a component belonged to the
-        track.
+    recent
+        The last epochs, their variances as adapted.
     last
         (m,) the last standardised innovation of each component; NaN before the first.
     products
@@ -69,16 +76,17 @@ class Lively(NamedTuple):
         the step that is not complete.
     steps
         (8, blocks, 2) the same of the steps before, whole.
-    rest, pause
-        (blocks,) steps until it is looked again, and how long that was the last time.
+    level, rest, pause
+        (blocks,) standard deviations of the sum of products that call for an estimate, for how
+        many steps they are more than usual, and for how many they will be the next time.
     """
 
     density: FloatArray
     recent: Epochs
-    used: BoolArray
     last: FloatArray
     products: FloatArray
     steps: FloatArray
+    level: FloatArray
     rest: IntArray
     pause: IntArray
 
@@ -89,11 +97,11 @@ def begin_lively(motion: Motion, blocks: int) -> Lively:
     none, whole = np.empty((0, m)), np.empty(0, np.int64)
     return Lively(
         motion.density.copy(),
-        Epochs(np.empty(0), none, none, np.empty((0, motion.groups)), whole, whole),
-        np.empty((0, m), np.bool_),
+        Epochs(np.empty(0), none, none, np.empty((0, motion.groups)), whole),
         np.full(m, np.nan),
         np.zeros((0, blocks, 2)),
         np.zeros((_SCALES[-1], blocks, 2)),
+        np.full(blocks, _FAR),
         np.zeros(blocks, np.int64),
         np.full(blocks, _WINDOW // _STEP),
     )
@@ -106,8 +114,7 @@ def follow(
     lively: Lively,
     epochs: Epochs,
     state: State,
-    *,
-    whole: bool,
+    prior: Prior,
 ) -> tuple[State, Lively, Estimate, tuple[Change, ...]]:
     """Estimate a part of a series in real time, with more process noise wherever it is called for.
 
@@ -123,9 +130,8 @@ def follow(
         From the part before.
     epochs, state
         The part, and the state of the filter before it.
-    whole
-        Whether what the filter left out is looked at as well: one of a single hypothesis that lags
-        behind locks itself out.
+    prior
+        What is supposed of wrong fixes, which are no motion.
 
     Returns
     -------
@@ -140,16 +146,18 @@ def follow(
         current = motion._replace(density=lively.density)
         part = _part(epochs, slice(at, None))
         after, estimate = run(current, part, state)
-        end, asked = _asked(lively, current, blocks, estimate, whole)
+        end, asked = _asked(lively, current, blocks, estimate)
         if end < len(part.time):
             part = _part(part, slice(0, end))
             after, estimate = run(current, part, state)
-        lively = _noted(lively, current, blocks, part, estimate, whole)
+        lively = _noted(lively, current, blocks, part, estimate)
         state, at = after, at + end
         found.append(estimate)
-        for block in asked:
-            lively, change = _estimated(lively, current, block, blocks[block], at - 1)
-            changes += change
+        for block, far in asked.items():
+            lively, process = _estimated(lively, current, prior, blocks[block], block, far)
+            if process > 0.0:
+                before = float(current.density[blocks[block][0]]) ** 0.5
+                changes.append(Change(at - 1, block, before, process))
         if at >= len(epochs.time):
             return state, lively, _joined(found), tuple(changes)
 
@@ -164,20 +172,11 @@ def _joined(parts: list[Estimate]) -> Estimate:
     return Estimate._make(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
-def _counts(motion: Motion, found: Estimate, whole: bool) -> BoolArray:
-    """(n, m) whether a component is looked at."""
-    seen = np.isfinite(found.standardised)
-    if whole:
-        return seen
-    weight = found.weight[:, motion.group[: seen.shape[1]]]
-    return np.asarray((weight > _BELONGS) & seen)
-
-
 def _products(
-    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate, whole: bool
+    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
 ) -> tuple[FloatArray, FloatArray]:
     """(n, blocks, 2) sums and counts at each epoch, those of the open step first; and (m,) last."""
-    used, d = _counts(motion, found, whole), motion.axes
+    used, d = np.isfinite(found.standardised), motion.axes
     out = np.zeros((len(used), len(blocks), 2))
     last = lively.last.copy()
     for b, axes in enumerate(blocks):
@@ -203,27 +202,28 @@ def _steps(lively: Lively, products: FloatArray) -> FloatArray:
 
 
 def _asked(
-    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate, whole: bool
-) -> tuple[int, list[int]]:
-    """Tell after how many epochs an estimate is called for, and of which blocks.
+    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
+) -> tuple[int, dict[int, float]]:
+    """Tell after how many epochs an estimate is called for, of which blocks, and how loudly.
 
     All epochs, and of none, where it is not.
     """
-    products, _ = _products(lively, motion, blocks, found, whole)
+    products, _ = _products(lively, motion, blocks, found)
     steps, most = _steps(lively, products), _SCALES[-1]
     number = len(steps) - most
-    far = np.zeros((number, len(blocks)), np.bool_)
+    far = np.zeros((number, len(blocks)))
     total = np.zeros((number, len(blocks), 2))
     for k in range(most):
         total += steps[most - k : most - k + number]
         if k + 1 in _SCALES:
-            far |= total[..., 0] > _FAR * np.sqrt(total[..., 1])
-    far &= np.arange(number)[:, None] >= lively.rest
-    if not far.any():
-        return len(found.mean), []
-    step = int(np.argmax(far.any(axis=1)))
+            np.maximum(far, total[..., 0] / np.sqrt(np.maximum(total[..., 1], 1.0)), out=far)
+    resting = np.arange(number)[:, None] < lively.rest
+    called = far > np.where(resting, lively.level, _FAR)
+    if not called.any():
+        return len(found.mean), {}
+    step = int(np.argmax(called.any(axis=1)))
     end = (step + 1) * _STEP - len(lively.products)
-    return end, np.flatnonzero(far[step]).tolist()
+    return end, {b: float(far[step, b]) for b in np.flatnonzero(called[step]).tolist()}
 
 
 def _noted(
@@ -232,10 +232,9 @@ def _noted(
     blocks: Sequence[Sequence[int]],
     epochs: Epochs,
     found: Estimate,
-    whole: bool,
 ) -> Lively:
     """Remember what a part brought."""
-    products, last = _products(lively, motion, blocks, found, whole)
+    products, last = _products(lively, motion, blocks, found)
     steps = _steps(lively, products)
     number = len(products) // _STEP
     variance = epochs.variance.copy()
@@ -245,7 +244,6 @@ def _noted(
     recent = Epochs._make(np.concatenate(pair)[-_WINDOW:] for pair in pairs)
     return lively._replace(
         recent=recent,
-        used=np.concatenate([lively.used, _counts(motion, found, whole)])[-_WINDOW:],
         last=last,
         products=products[number * _STEP :],
         steps=steps[-_SCALES[-1] :],
@@ -254,32 +252,69 @@ def _noted(
 
 
 def _estimated(
-    lively: Lively, motion: Motion, block: int, axes: Sequence[int], after: int
-) -> tuple[Lively, tuple[Change, ...]]:
-    """Estimate the process noise of a block anew, and take it over if it is clearly larger."""
-    columns = [*axes, *(motion.axes + a for a in axes)]
-    recent = lively.recent
-    z = np.where(lively.used, recent.z, np.nan)[:, columns]
-    seen = np.isfinite(z).any(axis=1)
-    sigma = np.sqrt(recent.variance[seen][:, columns])
-    observations = Observations(recent.time[seen], z[seen], np.zeros(seen.sum(), np.int64), sigma)
-    place, speed = (np.array([np.nanmedian(part)]) for part in np.split(sigma, 2, axis=1))
-    before = float(np.sqrt(lively.density[axes[0]]))
+    lively: Lively, motion: Motion, prior: Prior, axes: Sequence[int], block: int, far: float
+) -> tuple[Lively, float]:
+    """Estimate the process noise of a block anew; its root if it is clearly larger, else 0."""
+    now = float(lively.density[axes[0]])
 
-    def fit(process: float) -> NoiseFigures:
-        given = NoiseFigures(place, speed, process)
-        return estimate_noise(observations, given, order=motion.order, period=motion.period)
+    def evidence(density: float) -> float:
+        return _evidence(lively.recent, motion, prior, axes, density)
 
-    found = fit(np.nan)
-    pause, rest = lively.pause.copy(), lively.rest.copy()
-    if found.process < _LARGER * before or fit(before).cost - found.cost < _GAIN:
-        rest[block] = pause[block]
+    low, high = _bounds(lively.recent, motion, axes)
+    coarse = [
+        q for q in low * _COARSE ** np.arange(np.log(high / low) / np.log(_COARSE)) if q > now
+    ]
+    reached = {q: evidence(q) for q in (now, *coarse)}
+    best = max(reached, key=lambda q: reached[q])
+    reached |= {q: evidence(q) for q in best * _FINE if q > now}
+    best = max(reached, key=lambda q: reached[q])
+    level, rest, pause = lively.level.copy(), lively.rest.copy(), lively.pause.copy()
+    if reached[best] - reached[now] < _GAIN:
+        level[block], rest[block] = min(_LOUDER * far, _LOUDEST), pause[block]
         pause[block] = min(2 * pause[block], _PAUSE // _STEP)
-        return lively._replace(rest=rest, pause=pause), ()
-    pause[block] = _WINDOW // _STEP
-    rest[block] = 1
+        return lively._replace(level=level, rest=rest, pause=pause), 0.0
+    rest[block], pause[block] = 0, _WINDOW // _STEP
     density, steps = lively.density.copy(), lively.steps.copy()
-    density[list(axes)] = found.process**2
+    density[list(axes)] = best
     steps[:, block] = 0.0  # what went before was judged by less
-    change = Change(after, block, before, found.process)
-    return lively._replace(density=density, steps=steps, rest=rest, pause=pause), (change,)
+    after = lively._replace(density=density, steps=steps, rest=rest, pause=pause)
+    return after, best**0.5
+
+
+def _bounds(recent: Epochs, motion: Motion, axes: Sequence[int]) -> tuple[float, float]:
+    """Densities whose noise over a step is far below that of a fix, and far above what changes."""
+    steps = np.diff(recent.time)
+    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
+    least, most = np.inf, 0.0
+    for c in (*axes, *(motion.axes + a for a in axes)):
+        z = recent.z[:, c]
+        z = z[np.isfinite(z)]
+        if motion.period and c < motion.axes:
+            z = np.unwrap(z, period=motion.period)
+        if len(z) < 2:
+            continue
+        scale = step ** (2 * (motion.order - (c >= motion.axes)) - 1)
+        variance = float(np.nanmedian(recent.variance[:, c]))
+        least = min(least, variance / scale)
+        most = max(most, (variance + float(np.quantile(np.diff(z) ** 2, 0.9))) / scale)
+    if not most > 0.0:
+        return 1.0, 1.0
+    return least * _DOWN, most * _UP
+
+
+def _evidence(
+    recent: Epochs, motion: Motion, prior: Prior, axes: Sequence[int], density: float
+) -> float:
+    """Log-likelihood of the last epochs of some axes, whose fixes may be wrong for a while."""
+    d = len(axes)
+    columns = [*axes, *(motion.axes + a for a in axes)]
+    moving = Motion(motion.order, d, np.full(d, density), by_axis(d), 2 * d, motion.period)
+    epochs = recent._replace(
+        z=recent.z[:, columns],
+        variance=recent.variance[:, columns],
+        fixed=np.full((len(recent.time), 2 * d), np.nan),
+    )
+    alike = prior._replace(spread=prior.spread[columns])
+    bank = no_hypotheses(moving, _BRIEFLY)
+    _, found, _ = filter_hypotheses(moving, alike, epochs, bank, traced=False)
+    return float(found.evidence[_BEGIN:].sum())

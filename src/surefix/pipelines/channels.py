@@ -9,6 +9,7 @@ import numpy as np
 from surefix.cleaning.clock import ClockState, repair
 from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
 from surefix.filters.health import Health, no_health, watch
+from surefix.filters.learning import supposed
 from surefix.filters.liveliness import Lively, begin_lively, follow
 from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery
@@ -161,7 +162,9 @@ def _estimated(
         after, found = run(motion, epochs, before)
         return state._replace(filter=after), found
     lively = state.lively or begin_lively(motion, 1)
-    after, lively, found, _ = follow(run, motion, ((0,),), lively, epochs, before, whole=True)
+    speed, longest = state.recovery.sigma_velocity, state.recovery.after
+    prior = supposed(1, state.sigma, 1.0, speed, longest)
+    after, lively, found, _ = follow(run, motion, ((0,),), lively, epochs, before, prior)
     return state._replace(filter=after, lively=lively), found
 
 

@@ -165,7 +165,7 @@ def _estimated(
         return replace(session, filter=after), found, ()
     lively = session.lively or begin_lively(setup.motion, len(setup.blocks))
     after, lively, found, changes = follow(
-        run, setup.motion, setup.blocks, lively, all_rows.epochs, session.filter, whole=False
+        run, setup.motion, setup.blocks, lively, all_rows.epochs, session.filter, setup.prior
     )
     return replace(session, filter=after, lively=lively), found, changes
 
