@@ -72,10 +72,10 @@ class Lively(NamedTuple):
     last
         (m,) the last standardised innovation of each component; NaN before the first.
     products
-        (n, blocks, 2) sums of products of neighbouring innovations, and how many, at the epochs of
-        the step that is not complete.
+        (n, blocks, 2, 2) sums of products of neighbouring innovations, of positions and of
+        velocities, and how many, at the epochs of the step that is not complete.
     steps
-        (8, blocks, 2) the same of the steps before, whole.
+        (8, blocks, 2, 2) the same of the steps before, whole.
     level, rest, pause
         (blocks,) standard deviations of the sum of products that call for an estimate, for how
         many steps they are more than usual, and for how many they will be the next time.
@@ -99,8 +99,8 @@ def begin_lively(motion: Motion, blocks: int) -> Lively:
         motion.density.copy(),
         Epochs(np.empty(0), none, none, np.empty((0, motion.groups)), whole),
         np.full(m, np.nan),
-        np.zeros((0, blocks, 2)),
-        np.zeros((_SCALES[-1], blocks, 2)),
+        np.zeros((0, blocks, 2, 2)),
+        np.zeros((_SCALES[-1], blocks, 2, 2)),
         np.full(blocks, _FAR),
         np.zeros(blocks, np.int64),
         np.full(blocks, _WINDOW // _STEP),
@@ -175,9 +175,9 @@ def _joined(parts: list[Estimate]) -> Estimate:
 def _products(
     lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, blocks, 2) sums and counts at each epoch, those of the open step first; and (m,) last."""
+    """(n, blocks, 2, 2) sums and counts at each epoch, the open step first; and (m,) the last."""
     used, d = np.isfinite(found.standardised), motion.axes
-    out = np.zeros((len(used), len(blocks), 2))
+    out = np.zeros((len(used), len(blocks), 2, 2))
     last = lively.last.copy()
     for b, axes in enumerate(blocks):
         for c in (*axes, *(d + a for a in axes)):
@@ -185,14 +185,14 @@ def _products(
             values = np.clip(found.standardised[rows, c], -_LARGEST, _LARGEST)
             before = np.concatenate([[last[c]], values])[:-1]
             known = np.isfinite(before)
-            out[rows[known], b, 0] += (values * before)[known]
-            out[rows[known], b, 1] += 1.0
+            out[rows[known], b, c // d, 0] += (values * before)[known]
+            out[rows[known], b, c // d, 1] += 1.0
             last[c] = values[-1] if len(values) else last[c]
     return np.concatenate([lively.products, out]), last
 
 
 def _steps(lively: Lively, products: FloatArray) -> FloatArray:
-    """(8 + n, blocks, 2) sums over the steps before, and over those now whole."""
+    """(8 + n, blocks, 2, 2) sums over the steps before, and over those now whole."""
     whole = len(products) // _STEP
     each = products[: whole * _STEP].reshape(whole, _STEP, *products.shape[1:])
     total = np.zeros((whole, *products.shape[1:]))
@@ -212,11 +212,11 @@ def _asked(
     steps, most = _steps(lively, products), _SCALES[-1]
     number = len(steps) - most
     far = np.zeros((number, len(blocks)))
-    total = np.zeros((number, len(blocks), 2))
+    total = np.zeros((number, len(blocks), 2, 2))
     for k in range(most):
         total += steps[most - k : most - k + number]
         if k + 1 in _SCALES:
-            np.maximum(far, total[..., 0] / np.sqrt(np.maximum(total[..., 1], 1.0)), out=far)
+            np.maximum(far, _far(total), out=far)
     resting = np.arange(number)[:, None] < lively.rest
     called = far > np.where(resting, lively.level, _FAR)
     if not called.any():
@@ -224,6 +224,17 @@ def _asked(
     step = int(np.argmax(called.any(axis=1)))
     end = (step + 1) * _STEP - len(lively.products)
     return end, {b: float(far[step, b]) for b in np.flatnonzero(called[step]).tolist()}
+
+
+def _far(total: FloatArray) -> FloatArray:
+    """(n, blocks) standard deviations that sums (n, blocks, 2, 2) lie above nought.
+
+    Beside velocities these are asked alone: fixes that wander off from them are no motion.
+    """
+    positions, velocities = total[..., 0, :], total[..., 1, :]
+    aided = 2.0 * velocities[..., 1:] >= np.maximum(positions[..., 1:], 1.0)
+    asked = np.where(aided, velocities, positions + velocities)
+    return np.asarray(asked[..., 0] / np.sqrt(np.maximum(asked[..., 1], 1.0)))
 
 
 def _noted(
