@@ -80,7 +80,10 @@ def plain(value: Record | str) -> object:
 def test_usual_sentences_are_plain(body: bytes) -> None:
     text = sentence(body) + b"\r\n"
     lines = scan(text)
-    if body[:8] == b"GNGNS,23" or body[:7] in (b"PGRME,1", b"IIXDR,A"):  # left to the definition: the leap second …
+    if body[:8] == b"GNGNS,23" or body[:7] in (
+        b"PGRME,1",
+        b"IIXDR,A",
+    ):  # left to the definition: the leap second …
         assert lines.code.tolist() == [DECLINED]
         return
     said = parse(text)
