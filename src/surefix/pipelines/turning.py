@@ -293,13 +293,16 @@ def _unseen(
 
     On a line between two values it is off by half its second derivative times the times to both;
     on a line that goes on for a time t, with a slope taken over up to a second, by half of that
-    times t (t + 1 s). A central difference over ±h is off by the third derivative times h²/6.
+    times t (t + 1 s). The slope of a line is that of the middle between its ends, and off by the
+    second derivative times the time to it; there, over ±h, by the third derivative times h²/6.
     """
     swing, change = _TILT * _OMEGA**2, _TILT * _OMEGA**3
     ends = beyond > 0.0
     sigma = 0.5 * swing * np.where(ends, beyond * (beyond + 1.0), left * right)
-    half = np.maximum(np.where(left == 0.0, 0.0, np.maximum(left, right)), _TILT_SPAN)
-    return sigma, np.where(ends, swing * (beyond + 0.5), change * half**2 / 6.0)
+    half = np.maximum(np.maximum(left, right), _TILT_SPAN)
+    aside = np.minimum(np.minimum(left, right), 0.5 * np.abs(left - right))
+    inside = np.hypot(swing * aside, change * half**2 / 6.0)
+    return sigma, np.where(ends, swing * (beyond + 0.5), inside)
 
 
 def _between(known: FloatArray, angle: FloatArray, time: FloatArray) -> FloatArray:
