@@ -35,7 +35,7 @@ TYPES = (
 _GGA, _GNS, _RMC, _GLL, _VTG, _HDT, _HDM, _THS, _HDG, _VHW, _DPT, _DBT, _ZDA, _GST = range(14)
 _PASHR, _PSXN, _XDR = range(14, 17)
 _FIELDS = np.array([9, 9, 9, 4, 8, 2, 2, 2, 5, 8, 2, 6, 4, 8, 6, 5, 4])  # least numbers of fields
-_A, _E, _K, _M, _N, _S, _T, _V, _W = b"AEKMNSTVW"
+_A, _D, _E, _K, _M, _N, _S, _T, _V, _W = b"ADEKMNSTVW"
 _F = ord("f"), ord("M"), ord("F")
 _MANY = 24  # fields, of which `surefix.io.nmea_scan` keeps the places
 _ROLL, _PITCH, _PTCH = (np.frombuffer(word, np.uint8) for word in (b"ROLL", b"PITCH", b"PTCH"))
@@ -47,8 +47,10 @@ def decode(code: int, data: ByteArray, comma: IntArray, commas: int, v: FloatArr
 
     Field i lies between ``comma[i]`` and ``comma[i + 1]``; there are ``commas`` of them.
     """
-    if commas < _FIELDS[code] or code == _XDR:
+    if commas < _FIELDS[code] or commas >= _MANY:
         return False
+    if code == _XDR:
+        return _transducers(data, comma, commas, v)
     if code in (_PASHR, _PSXN):
         return _attitude(code, data, comma, v)
     if code in (_GGA, _GNS):
@@ -99,6 +101,23 @@ def _is(data: ByteArray, a: int, b: int, word: ByteArray) -> bool:
         if c != word[k] and c - 32 != word[k]:
             return False
     return True
+
+
+@helper
+def _transducers(data: ByteArray, comma: IntArray, commas: int, v: FloatArray) -> bool:
+    """The first roll and the first pitch; behind the two, whether each is told at all."""
+    v[0], v[1], v[2], v[3], v[4], v[5] = np.nan, np.nan, np.nan, np.nan, 0.0, 0.0
+    for i in range(0, commas - 3, 4):
+        a, b = comma[i + 3] + 1, comma[i + 4]
+        roll = _is(data, a, b, _ROLL)
+        known = roll or _is(data, a, b, _PITCH) or _is(data, a, b, _PTCH)
+        place = 2 if roll else 3
+        plain = _letter(data, comma, i) == _A and _letter(data, comma, i + 2) == _D
+        if known and plain and v[place + 2] == 0.0:
+            v[place], v[place + 2] = _number(data, comma, i + 1, True), 1.0
+            if np.abs(v[place]) > STEEPEST:
+                return False
+    return bool(v[4] + v[5] > 0.0)
 
 
 @helper

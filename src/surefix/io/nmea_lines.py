@@ -172,6 +172,10 @@ def _attitude(talker: str, kind: str, v: _Values) -> Attitude:
     return Attitude(talker, kind, v[0], v[1], v[2], v[3])
 
 
+def _transducers(talker: str, kind: str, v: _Values) -> Attitude:
+    return Attitude(talker, kind, v[0], None, v[2] if v[4] else None, v[3] if v[5] else None)
+
+
 _BUILDERS: dict[str, Callable[[str, str, _Values], Record]] = {
     "GGA": _position,
     "GNS": _position,
@@ -189,6 +193,6 @@ _BUILDERS: dict[str, Callable[[str, str, _Values], Record]] = {
     "GST": _sigma,
     "PASHR": _attitude,
     "PSXN": _attitude,
-    "XDR": _attitude,  # always declined
+    "XDR": _transducers,
 }
 _BUILD = [_BUILDERS[name] for name in TYPES]
