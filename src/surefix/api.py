@@ -27,6 +27,7 @@ def clean(
     depth: Data | None = None,
     velocity: Data | None = None,
     heading: Data | None = None,
+    attitude: Data | None = None,
     columns: Mapping[str, str] | None = None,
     target: str | None = None,
     edits: str | Path | None = None,
@@ -41,7 +42,7 @@ def clean(
         ``height``, optionally velocities and standard deviations. A path or several, or a table
         (pandas, Polars, Arrow, a mapping of names to arrays), or a list of such. Nothing of it is
         modified.
-    depth, velocity, heading
+    depth, velocity, heading, attitude
         Other sensors, each of the same kinds, with their own clocks and rates.
     columns
         What columns mean where their names do not say it: ``{"time": "lcm_timestamp:us"}``.
@@ -70,6 +71,7 @@ def clean(
         depth=depth,
         velocity=velocity,
         heading=heading,
+        attitude=attitude,
         columns=columns,
         target=target,
     )

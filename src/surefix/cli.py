@@ -19,6 +19,7 @@ from surefix.cli_edit import edit
 from surefix.cli_experiment import JsonFile, Report, Seed, check_place, check_report, tell
 from surefix.cli_fleet import fleet
 from surefix.cli_inputs import (
+    Attitude,
     Columns,
     Depth,
     Heading,
@@ -162,6 +163,7 @@ def clean(
     depth: Depth = None,
     velocity: Velocity = None,
     heading: Heading = None,
+    attitude: Attitude = None,
     column: Columns = None,
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
@@ -205,15 +207,13 @@ def clean(
         _delays(sensor_delay or []),
     )
     check_report(report)
-    given = (*inputs, depth, velocity, heading, options, edits)
-    files = [Path(path) for path in given if path is not None]
+    beside = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
+    files = [Path(path) for path in (*inputs, *beside.values(), options, edits) if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
-            depth=depth,
-            velocity=velocity,
-            heading=heading,
+            **beside,
             columns={**columns, **mapping(column or [])},
             require_checksum=not no_checksum,
             target=target,
@@ -238,6 +238,7 @@ def info(
     depth: Depth = None,
     velocity: Velocity = None,
     heading: Heading = None,
+    attitude: Attitude = None,
     column: Columns = None,
     no_checksum: NoChecksum = False,
     target: Target = None,
@@ -247,13 +248,12 @@ def info(
     from surefix.io.columns import mapping
     from surefix.pipelines.info import describe, info_lines
 
-    files = [Path(path) for path in (*inputs, depth, velocity, heading) if path is not None]
+    beside = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
+    files = [Path(path) for path in (*inputs, *beside.values()) if path is not None]
     with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
-            depth=depth,
-            velocity=velocity,
-            heading=heading,
+            **beside,
             columns=mapping(column or []),
             require_checksum=not no_checksum,
             target=target,

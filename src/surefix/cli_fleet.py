@@ -59,6 +59,9 @@ def fleet(
     heading: Annotated[
         str | None, typer.Option(metavar="FILE", help="The same for a heading log.")
     ] = None,
+    attitude: Annotated[
+        str | None, typer.Option(metavar="FILE", help="The same for a log of roll and pitch.")
+    ] = None,
     to: Annotated[
         Literal["parquet", "csv", "geojson", "gpx", "nmea"],
         typer.Option("--format", help="Of the outputs; tracks of a data set are Parquet."),
@@ -80,7 +83,7 @@ def fleet(
     from surefix.io.columns import mapping
 
     chosen, columns = chosen_options(options, {"mode": mode, "method": method}, {})
-    beside = {"depth": depth, "velocity": velocity, "heading": heading}
+    beside = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
     given = FleetOptions(
         clean=chosen,
         columns={**columns, **mapping(column or [])},

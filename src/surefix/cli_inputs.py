@@ -38,6 +38,9 @@ Velocity = Annotated[
 Heading = Annotated[
     Path | None, typer.Option(help="Log of a heading sensor; turns body velocities.")
 ]
+Attitude = Annotated[
+    Path | None, typer.Option(help="Log of roll and pitch; they carry lever arms.")
+]
 NoChecksum = Annotated[
     bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
 ]

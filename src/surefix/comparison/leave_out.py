@@ -83,7 +83,7 @@ def recorded(sources: Sequence[Source]) -> Recording:
         plain = source.role == "fixes"
         logs = tuple(replace(log, channels=()) if plain else log for log in source.logs)
         parts.append((logs, source.role, source.name))
-    return Recording(tuple(part for part in parts if part[1] != "heading"))
+    return Recording(tuple(part for part in parts if part[1] not in ("heading", "attitude")))
 
 
 def fixes_of(cleaned: Cleaned) -> Held:

@@ -26,8 +26,8 @@ class FleetOptions:
     columns
         What columns mean, as for a single log.
     beside
-        Role (``depth``, ``velocity``, ``heading``) and file name of the logs that stand in the
-        folder of each log and support it.
+        Role (``depth``, ``velocity``, ``heading``, ``attitude``) and file name of the logs that
+        stand in the folder of each log and support it.
     require_checksum
         False accepts NMEA sentences without a checksum.
     target

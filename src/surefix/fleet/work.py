@@ -71,6 +71,7 @@ def _log(task: LogTask) -> Done:
         depth=task.beside.get("depth"),
         velocity=task.beside.get("velocity"),
         heading=task.beside.get("heading"),
+        attitude=task.beside.get("attitude"),
         require_checksum=task.require_checksum,
         target=task.target,
     )

@@ -1,4 +1,4 @@
-"""Acoustic instruments that do not speak NMEA: one record from one line, or why not.
+"""Instruments that do not speak NMEA: one record from one line, or why not.
 
 - EvoLogics modems with USBL, ``+++AT:length:USBLLONG,…``: time now, time of the measurement,
   address, X, Y, Z, E, N, U, roll, pitch, yaw, propagation time, RSSI, integrity, accuracy.
@@ -6,6 +6,7 @@
   are by the modem's compass; the length before them is the only guard against damage.
 - Water Linked DVL A50/A125, *TCP JSON API*, ``json_v3`` to ``json_v3.3``: one object a line. X, Y,
   Z point forward, to starboard and down; ``fom`` is taken for the standard deviation.
+- Motion sensors, ``:00FFCA -0003F-0325  0319`` (TSS1), see `surefix.io.attitude_sentence`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import math
 import re
 from typing import Any
 
-from surefix.io.acoustic_record import BodyVelocity, Sighting
+from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
+from surefix.io.attitude_sentence import motion_line
 from surefix.io.nmea_record import Refused
 
 __all__ = ["read_line"]
@@ -32,7 +34,7 @@ _LONGEST_S = 60.0  # between a measurement and the line that tells it
 _KNOWN = frozenset({"velocity", "velocity_water", "position_local", "response"})
 
 
-def read_line(line: bytes) -> tuple[bytes, Sighting | BodyVelocity | Refused] | None:
+def read_line(line: bytes) -> tuple[bytes, Sighting | BodyVelocity | Attitude | Refused] | None:
     """What stands before the message of a line, a time of reception perhaps, and what it says.
 
     None if the line holds no message of a kind that is known here; never an exception.
@@ -48,7 +50,7 @@ def read_line(line: bytes) -> tuple[bytes, Sighting | BodyVelocity | Refused] | 
     if start is not None:
         told = _report(line[start.start() :])
         return None if told is None else (line[: start.start()], told)
-    return None
+    return motion_line(line)
 
 
 def _notice(length: int, body: bytes, name: bytes) -> Sighting | Refused:

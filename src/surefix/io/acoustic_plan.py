@@ -152,7 +152,7 @@ def _look(seen: Seen, frames: list[Frame], require_checksum: bool) -> None:
             seen.fixed(record)
         elif isinstance(record, Heading):
             seen.turned(record.type, record.true)
-        elif isinstance(record, Attitude):
+        elif isinstance(record, Attitude) and record.heading is not None:
             seen.turned(record.type, record.heading)
 
 

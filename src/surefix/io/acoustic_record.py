@@ -62,12 +62,18 @@ class Sighting(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """Heading of the ship (true, degrees); ``second`` since midnight, NaN if it has no time."""
+    """How a vehicle lies, degrees; ``second`` since midnight, NaN if the sentence has no time.
+
+    Heading is true, roll is positive with starboard down, pitch with the bow up. What the sentence
+    does not tell at all is None, what it leaves empty is NaN.
+    """
 
     talker: str
     type: str
     second: float
-    heading: float
+    heading: float | None
+    roll: float | None = None
+    pitch: float | None = None
 
 
 class BodyVelocity(NamedTuple):

@@ -23,7 +23,9 @@ __all__ = ["GAP", "HEADINGS", "Placed", "Ship", "placed"]
 GAP = 10.0
 """s between two fixes, or two headings, of the ship that are still interpolated between."""
 
-HEADINGS = {"PSIMSNS": 0, "HDT": 1, "THS": 1, "PTSAH": 2, "HDG": 3, "HDM": 3}
+HEADINGS = {
+    "PSIMSNS": 0, "HDT": 1, "THS": 1, "PTSAH": 2, "PASHR": 2, "PSXN": 2, "HDG": 3, "HDM": 3,
+}  # fmt: skip
 """Sentences with a true heading and their rank; those of the best rank in a log turn positions."""
 
 _KEPT = 4096

@@ -3,10 +3,11 @@
 The contract: ``time`` (s or ISO 8601), then ``x, y, z`` (m, z up, one to three of them) or
 ``lat, lon`` with ``depth`` (positive down) or ``height``; optionally ``vx, vy, vz`` or
 ``ve, vn, vu`` (m/s), ``sensor``, ``sigma…``, ``edit``, ``valid``, and the scalar series ``depth``,
-``heading``, ``speed``, ``course``. Other names are recognised where only one column can be meant:
-without regard to case, with the unit in the name (``time_ms``, ``depth [m]``, ``speed_kn``), and by
-the synonyms of `surefix.io.roles`. Where two columns compete for a required role the answer is an
-error that names the remedy; for an optional role both are left out and a note says so.
+``heading``, ``roll``, ``pitch``, ``speed``, ``course``. Other names are recognised where only one
+column can be meant: without regard to case, with the unit in the name (``time_ms``, ``depth [m]``,
+``speed_kn``), and by the synonyms of `surefix.io.roles`. Where two columns compete for a required
+role the answer is an error that names the remedy; for an optional role both are left out and a note
+says so.
 
 The user decides with ``role=[-]column[:unit]``:
 
@@ -34,12 +35,13 @@ from surefix.types import Event
 
 __all__ = ["Layout", "Picks", "Role", "mapping", "recognise"]
 
-Role = Literal["fixes", "depth", "velocity", "heading"]
+Role = Literal["fixes", "depth", "velocity", "heading", "attitude"]
 Picks = tuple[Pick | None, Pick | None, Pick | None]
 
 _NONE: Picks = (None, None, None)
 _BODY = ("forward", "starboard", "down")
-_BESIDE = ("depth", "heading", "course", "speed")
+_TILT = ("roll", "pitch")
+_BESIDE = ("depth", "heading", *_TILT, "course", "speed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +141,10 @@ def recognise(
             return _series(seek, time, _BODY[:2], _BODY[2:])
         case "velocity":
             return _velocities(seek, time)
+        case "heading":
+            return _series(seek, time, (role,), _TILT)
+        case "attitude":
+            return _series(seek, time, _TILT, ("heading",))
         case _:
             return _series(seek, time, (role,))
 

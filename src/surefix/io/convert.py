@@ -8,7 +8,9 @@ import numpy as np
 import pyarrow as pa
 
 from surefix.errors import ParseError
+from surefix.geo.angle import wrap
 from surefix.geo.time import unix_seconds, unix_unit
+from surefix.io.attitude_sentence import STEEPEST
 from surefix.io.cells import Cells, edits, flags, names, numbers, texts, times
 from surefix.io.columns import Layout, Picks
 from surefix.io.match import Pick
@@ -18,6 +20,7 @@ __all__ = ["Converter"]
 
 Columns = Mapping[int, pa.ChunkedArray]
 Place = Callable[[int], str]
+_TILTS = ("roll_deg", "pitch_deg")
 
 
 class Converter:
@@ -147,8 +150,18 @@ class Converter:
             kept = np.isfinite(value) if valid is None else np.isfinite(value) & valid
             value = np.where(kept, value, np.nan)
             value = np.mod(value, period) if period else value
+            value = self._tilt(value, pick) if name in _TILTS else value
             found.append(Channel(name, self._default, time, value, period))
         return tuple(found)
+
+    def _tilt(self, value: FloatArray, pick: Pick) -> FloatArray:
+        """Roll or pitch, of which 358° is −2°, and more than 90° to a side is none."""
+        value = wrap(value)
+        wrong = np.abs(value) > STEEPEST
+        if wrong.any():
+            example = self._example(pick, int(np.argmax(wrong)))
+            self.count("range", int(wrong.sum()), example, "the angle was taken as missing")
+        return np.where(wrong, np.nan, value)
 
     def _sensor(self) -> IntArray:
         pick = self._layout.sensor

@@ -6,6 +6,7 @@ import re
 from functools import lru_cache
 
 from surefix.io.acoustic_sentence import PROPRIETARY, UnknownCoordinatesError
+from surefix.io.attitude_sentence import ATTITUDE, TRANSDUCERS, UnreadError
 from surefix.io.nmea_record import Record, Refused
 from surefix.io.nmea_sentence import LAYOUTS, Layout, OutOfRangeError
 
@@ -14,6 +15,8 @@ __all__ = ["MAX_LENGTH", "checksum", "parse"]
 MAX_LENGTH = 1024
 """Longest sentence accepted, bytes. The standard says 82, but proprietary ones are longer."""
 
+_LAYOUTS = {**LAYOUTS, **TRANSDUCERS}
+_OWN = {**PROPRIETARY, **ATTITUDE}
 _DIGITS = "0123456789abcdefABCDEF"
 _HEX = {(a + b).encode(): int(a + b, 16) for a in _DIGITS for b in _DIGITS}
 _ADDRESS = re.compile(r"P[A-Z0-9]{3,}|[A-Z][A-Z0-9][A-Z0-9]{3}")
@@ -77,8 +80,8 @@ def parse(sentence: bytes, *, require_checksum: bool = True) -> Record | Refused
     except UnicodeDecodeError:
         return Refused("binary", "")
     comma = text.find(",")
-    layout = LAYOUTS.get(text[2:5]) if comma == 5 and text[0] != "P" else None
-    own = PROPRIETARY.get(text[:comma]) if layout is None else None
+    layout = _LAYOUTS.get(text[2:5]) if comma == 5 and text[0] != "P" else None
+    own = _OWN.get(text[:comma]) if layout is None else None
     known = layout or own
     if known is None:
         return _unknown(text[:comma] if comma >= 0 else text)
@@ -112,6 +115,8 @@ def _read_own(text: str, comma: int, layout: Layout) -> Record | Refused:
 def _built(layout: Layout, talker: str, kind: str, match: re.Match[str]) -> Record | Refused:
     try:
         return layout.build(talker, kind, match.groups(""))
+    except UnreadError:
+        return Refused("unknown-type", kind)
     except OutOfRangeError as error:
         return Refused("range", str(error))
     except UnknownCoordinatesError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from surefix.io.attitude_sentence import STEEPEST
 from surefix.io.nmea_fields import (
     DECLINED,
     day_of,
@@ -22,18 +23,22 @@ from surefix.io.nmea_sentence import FOOT, KMH, KNOT
 from surefix.jit import helper
 from surefix.types import ByteArray, FloatArray, IntArray
 
-__all__ = ["TYPES", "decode"]
+__all__ = ["TYPES", "decode", "heeded"]
 
 TYPES = (
     *("GGA", "GNS", "RMC", "GLL", "VTG", "HDT", "HDM"),
     *("THS", "HDG", "VHW", "DPT", "DBT", "ZDA", "GST"),
+    *("PASHR", "PSXN", "XDR"),
 )
 """Sentence types that are read here, by their code."""
 
 _GGA, _GNS, _RMC, _GLL, _VTG, _HDT, _HDM, _THS, _HDG, _VHW, _DPT, _DBT, _ZDA, _GST = range(14)
-_FIELDS = np.array([9, 9, 9, 4, 8, 2, 2, 2, 5, 8, 2, 6, 4, 8])  # least numbers of fields
-_A, _E, _K, _M, _N, _S, _T, _V, _W = b"AEKMNSTVW"
+_PASHR, _PSXN, _XDR = range(14, 17)
+_FIELDS = np.array([9, 9, 9, 4, 8, 2, 2, 2, 5, 8, 2, 6, 4, 8, 6, 5, 4])  # least numbers of fields
+_A, _D, _E, _K, _M, _N, _S, _T, _V, _W = b"ADEKMNSTVW"
 _F = ord("f"), ord("M"), ord("F")
+_MANY = 24  # fields, of which `surefix.io.nmea_scan` keeps the places
+_ROLL, _PITCH, _PTCH = (np.frombuffer(word, np.uint8) for word in (b"ROLL", b"PITCH", b"PTCH"))
 
 
 @helper
@@ -42,8 +47,12 @@ def decode(code: int, data: ByteArray, comma: IntArray, commas: int, v: FloatArr
 
     Field i lies between ``comma[i]`` and ``comma[i + 1]``; there are ``commas`` of them.
     """
-    if commas < _FIELDS[code]:
+    if commas < _FIELDS[code] or commas >= _MANY:
         return False
+    if code == _XDR:
+        return _transducers(data, comma, commas, v)
+    if code in (_PASHR, _PSXN):
+        return _attitude(code, data, comma, v)
     if code in (_GGA, _GNS):
         return _gga(code, data, comma, v)
     if code == _RMC:
@@ -63,6 +72,75 @@ def decode(code: int, data: ByteArray, comma: IntArray, commas: int, v: FloatArr
     if code in (_DPT, _DBT):
         return _depth(code, data, comma, v)
     return _heading(code, data, comma, v)
+
+
+@helper
+def heeded(code: int, data: ByteArray, comma: IntArray, commas: int) -> bool:
+    """Whether a sentence of a type is of the kind that is read; else it is an unknown one."""
+    if code < _PASHR:
+        return True
+    a, b = comma[0] + 1, comma[1]
+    if code == _PSXN:
+        return commas < 2 or a == b or not 48 <= data[a] <= 57 or _is_attitude(data, a, b)
+    if code == _PASHR:
+        return commas < 2 or a == b or not 65 <= data[a] <= 90
+    for i in range(3, commas):
+        a, b = comma[i] + 1, comma[i + 1]
+        if _is(data, a, b, _ROLL) or _is(data, a, b, _PITCH) or _is(data, a, b, _PTCH):
+            return True
+    return commas < _FIELDS[_XDR] or commas >= _MANY
+
+
+@helper
+def _is(data: ByteArray, a: int, b: int, word: ByteArray) -> bool:
+    """Whether a field is a certain word, in capitals or not."""
+    if b - a != len(word):
+        return False
+    for k in range(len(word)):
+        c = int(np.int64(data[a + k]))
+        if c != word[k] and c - 32 != word[k]:
+            return False
+    return True
+
+
+@helper
+def _transducers(data: ByteArray, comma: IntArray, commas: int, v: FloatArray) -> bool:
+    """The first roll and the first pitch; behind the two, whether each is told at all."""
+    v[0], v[1], v[2], v[3], v[4], v[5] = np.nan, np.nan, np.nan, np.nan, 0.0, 0.0
+    for i in range(0, commas - 3, 4):
+        a, b = comma[i + 3] + 1, comma[i + 4]
+        roll = _is(data, a, b, _ROLL)
+        known = roll or _is(data, a, b, _PITCH) or _is(data, a, b, _PTCH)
+        place = 2 if roll else 3
+        plain = _letter(data, comma, i) == _A and _letter(data, comma, i + 2) == _D
+        if known and plain and v[place + 2] == 0.0:
+            v[place], v[place + 2] = _number(data, comma, i + 1, True), 1.0
+            if np.abs(v[place]) > STEEPEST:
+                return False
+    return bool(v[4] + v[5] > 0.0)
+
+
+@helper
+def _is_attitude(data: ByteArray, a: int, b: int) -> bool:
+    """Whether the number of a PSXN sentence is 23."""
+    return b - a == 2 and digits(data, a, b) == 23
+
+
+@helper
+def _attitude(code: int, data: ByteArray, comma: IntArray, v: FloatArray) -> bool:
+    v[0] = np.nan
+    roll, heading = (3, 1) if code == _PASHR else (1, 3)
+    if code == _PASHR:
+        v[0] = time_of_day(data, comma[0] + 1, comma[1])
+        if not _mark(data, comma, 2, _T):
+            return False
+    elif not _is_attitude(data, comma[0] + 1, comma[1]):
+        return False
+    v[1] = _number(data, comma, heading, False)
+    v[2], v[3] = _number(data, comma, roll, True), _number(data, comma, roll + 1, True)
+    # DECLINED is infinite
+    plain = v[0] != DECLINED and not v[1] > 360.0
+    return plain and not np.abs(v[2]) > STEEPEST and not np.abs(v[3]) > STEEPEST
 
 
 @helper

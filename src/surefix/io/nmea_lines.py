@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from surefix.io.acoustic_record import Attitude
 from surefix.io.nmea import parse
 from surefix.io.nmea_decode import TYPES
 from surefix.io.nmea_frame import Frame, Framing, frame
@@ -34,6 +35,7 @@ __all__ = ["Plain", "pieces"]
 _MOST = 1000  # addresses that are remembered
 _UNKNOWN: dict[bytes, bool] = {}  # whether `parse` does not know an address either
 _Values = tuple[float, ...]
+_TYPE = 3  # letters of a type behind a talker
 
 
 class Plain(NamedTuple):
@@ -128,7 +130,7 @@ def _records(
         zip(*columns, strict=True),
         strict=True,
     ):
-        talker = data[begin : begin + 2].decode()
+        talker = data[begin : begin + 2].decode() if len(TYPES[code]) == _TYPE else ""
         yield line, received, _BUILD[code](talker, TYPES[code], values)
 
 
@@ -166,6 +168,14 @@ def _sigma(talker: str, kind: str, v: _Values) -> Sigma:
     return Sigma(talker, kind, v[0], v[1], v[2], v[3])
 
 
+def _attitude(talker: str, kind: str, v: _Values) -> Attitude:
+    return Attitude(talker, kind, v[0], v[1], v[2], v[3])
+
+
+def _transducers(talker: str, kind: str, v: _Values) -> Attitude:
+    return Attitude(talker, kind, v[0], None, v[2] if v[4] else None, v[3] if v[5] else None)
+
+
 _BUILDERS: dict[str, Callable[[str, str, _Values], Record]] = {
     "GGA": _position,
     "GNS": _position,
@@ -181,5 +191,8 @@ _BUILDERS: dict[str, Callable[[str, str, _Values], Record]] = {
     "DBT": _depth,
     "ZDA": _clock,
     "GST": _sigma,
+    "PASHR": _attitude,
+    "PSXN": _attitude,
+    "XDR": _transducers,
 }
 _BUILD = [_BUILDERS[name] for name in TYPES]

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from surefix.io.nmea import MAX_LENGTH
-from surefix.io.nmea_decode import TYPES, decode
+from surefix.io.nmea_decode import TYPES, decode, heeded
 from surefix.io.nmea_fields import instant
 from surefix.jit import helper, kernel
 from surefix.types import ByteArray, FloatArray, IntArray
@@ -107,9 +107,11 @@ def _line(data: ByteArray, begin: int, end: int, comma: IntArray, lines: Lines, 
     lines.address[i, 0], lines.address[i, 1] = start + 1, comma[0]
     for code in range(len(_CODES)):
         if name == _CODES[code]:
+            if not heeded(code, data, comma, commas):
+                return UNKNOWN
             sound = decode(code, data, comma, commas, lines.values[i])
             return code if sound else DECLINED
-    return UNKNOWN
+    return DECLINED if data[start + 1] == _P else UNKNOWN
 
 
 @helper
@@ -154,7 +156,7 @@ def _hex(c: int) -> int:
 
 @helper
 def _address(data: ByteArray, a: int, b: int) -> int:
-    """Type of an address, a number of three bytes; 0: proprietary, declined; −1: no address."""
+    """Type of an address, or the whole of a proprietary one, as a number; not above 0: neither."""
     if b - a < 4 or (data[a] != _P and b - a != 5):
         return -1
     for k in range(a, b):
@@ -162,10 +164,10 @@ def _address(data: ByteArray, a: int, b: int) -> int:
         capital = 65 <= c <= 90
         if not capital and (k == a or not 48 <= c <= 57):
             return -1
-    if data[a] == _P:
+    if data[a] == _P and b - a > 7:
         return 0
     name = 0
-    for k in range(a + 2, b):
+    for k in range(a if data[a] == _P else a + 2, b):
         name = 256 * name + int(np.int64(data[k]))
     return name
 

@@ -331,9 +331,12 @@ class NmeaStream:
         return None if self._sightings is None else self._sightings.see(record, time)
 
     def _attitude(self, record: Attitude) -> None:
-        time = self._instant(record.second, None)
-        self._channels.add("heading_deg", record.type, time, record.heading)
-        if self._sightings is not None:
+        time, sensor = self._instant(record.second, None), record.talker + record.type
+        for name in ("heading", "roll", "pitch"):
+            value = getattr(record, name)
+            if value is not None:
+                self._channels.add(f"{name}_deg", sensor, time, value)
+        if self._sightings is not None and record.heading is not None:
             self._sightings.turn(record.type, record.heading, time)
 
     def _body_velocity(self, record: BodyVelocity) -> None:

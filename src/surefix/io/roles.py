@@ -69,6 +69,8 @@ ROLES: Final = {
     "sigma_vy": _names("speed", "sigma_vy sigma_vn"),
     "sigma_vz": _names("speed", "sigma_vz sigma_vu"),
     "heading": _names("angle", "heading hdg true_heading heading_true"),
+    "roll": _names("angle", "roll roll_angle"),
+    "pitch": _names("angle", "pitch pitch_angle"),
     "course": _names("angle", "course cog course_over_ground"),
     "speed": _names("speed", "speed ground_speed sog speed_over_ground"),
 }
@@ -92,6 +94,8 @@ NEEDS_UNIT: Final = ("sog", "speed_over_ground")
 CHANNELS: Final = {
     "depth": ("depth_m", 0.0),
     "heading": ("heading_deg", 360.0),
+    "roll": ("roll_deg", 0.0),
+    "pitch": ("pitch_deg", 0.0),
     "course": ("course_deg", 360.0),
     "speed": ("speed_mps", 0.0),
     "forward": ("forward_mps", 0.0),

@@ -2,8 +2,9 @@
 
 Bad data never stops a file. A cell that cannot be read is NaN, counted as ``cell``; a record with
 a wrong number of fields stays as a missing one, counted as ``row``; an impossible latitude or
-longitude takes the position with it, counted as ``range``; a standard deviation that is not a
-positive number is NaN, counted as ``sigma``; a word other than accept or reject, as ``edit``.
+longitude takes the position with it, counted as ``range``, like a roll or pitch
+beyond 90°; a standard deviation that is not a positive number is NaN, counted as ``sigma``; a word
+other than accept or reject, as ``edit``.
 """
 
 from __future__ import annotations
@@ -51,8 +52,9 @@ def read_table(
         What the columns mean, where their names do not say it; see `surefix.io.columns`.
     role
         ``fixes``: positions, with the scalar series beside them. ``depth``, ``heading``: one
-        series. ``velocity``: fixes without position, or in the body frame the series
-        ``forward_mps``, ``starboard_mps``, ``down_mps``.
+        series, with a heading also roll and pitch, if they are there. ``attitude``: roll and pitch,
+        also heading, if it is there. ``velocity``: fixes without position, or in the body frame the
+        series ``forward_mps``, ``starboard_mps``, ``down_mps``.
     sensor
         Name of the sensor where no column names it.
     chunk

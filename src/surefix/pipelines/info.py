@@ -28,6 +28,7 @@ def describe(
     depth: str | Path | None = None,
     velocity: str | Path | None = None,
     heading: str | Path | None = None,
+    attitude: str | Path | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     target: str | None = None,
@@ -37,7 +38,7 @@ def describe(
 
     Parameters
     ----------
-    inputs, depth, velocity, heading, columns, require_checksum, target, progress
+    inputs, depth, velocity, heading, attitude, columns, require_checksum, target, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
@@ -46,6 +47,7 @@ def describe(
         depth=depth,
         velocity=velocity,
         heading=heading,
+        attitude=attitude,
         columns=columns,
         require_checksum=require_checksum,
         target=target,
@@ -73,6 +75,7 @@ def describe(
                 "--depth": depth,
                 "--velocity": velocity,
                 "--heading": heading,
+                "--attitude": attitude,
                 "--target": target,
             },
             columns,

@@ -39,6 +39,7 @@ def open_inputs(
     depth: Data | None = None,
     velocity: Data | None = None,
     heading: Data | None = None,
+    attitude: Data | None = None,
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     target: str | None = None,
@@ -51,7 +52,7 @@ def open_inputs(
     inputs
         Logs with positions: files (CSV, Parquet, NMEA 0183, the SQLite journal of a live service),
         URLs of its journals, or tables (data frames, Arrow tables, mappings of names to arrays).
-    depth, velocity, heading
+    depth, velocity, heading, attitude
         Other sensors, each a file or a table, with their own clocks and rates.
     columns
         Roles and columns as in `surefix.io.columns`. ``depth.time`` is a role of the depth log
@@ -72,7 +73,7 @@ def open_inputs(
     if not inputs:
         raise OptionsError("no input", "one file or more")
     opener = _Opener(dict(columns or {}), require_checksum, target, progress)
-    given = {"depth": depth, "velocity": velocity, "heading": heading}
+    given = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
     opener.check({role for role, data in given.items() if data is not None})
     sources: list[Source] = []
     for data in inputs:
@@ -82,10 +83,10 @@ def open_inputs(
             sources.append(Source(opener.open(data, "fixes"), "fixes", _name(data)))
     if depth is not None:
         sources.append(Source(opener.open(depth, "depth"), "depth", _name(depth, "depth")))
-    if heading is not None and not any(_same(heading, data) for data in inputs):
-        sources.append(
-            Source(opener.open(heading, "heading"), "heading", _name(heading, "heading"))
-        )
+    lies: tuple[tuple[Data, Role], ...] = ((heading, "heading"), (attitude, "attitude"))
+    for data, role in lies:
+        if data is not None and not any(_same(data, other) for other in inputs):
+            sources.append(Source(opener.open(data, role), role, _name(data, role)))
     if velocity is not None:
         turning = list(opener.open(heading, "heading")) if heading is not None else None
         logs = _earth_frame(opener.open(velocity, "velocity"), turning)

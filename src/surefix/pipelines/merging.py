@@ -23,12 +23,13 @@ from surefix.pipelines.rows import (
     take_fixes,
     take_rows,
 )
-from surefix.pipelines.turning import Arm, Turning, arms_at, reached, turned
+from surefix.pipelines.turning import ANGLES, Arm, Turning, arms_at, reached, turned
 from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
 
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
 
-_WITH_CHANNELS = ("fixes", "heading")  # roles whose scalar series are cleaned beside the track
+_ATTITUDE = ("heading", "attitude")  # roles of inputs that tell how the vehicle lies, nothing else
+_WITH_CHANNELS = ("fixes", *_ATTITUDE)  # roles whose scalar series are cleaned beside the track
 _NO_SERIES = "velocity_sigma_mps"  # what a sensor declares of its velocities is not one
 
 
@@ -75,8 +76,9 @@ class Merging(NamedTuple):
         Time up to which rows were let go, s.
     arms
         Where the antenna of each sensor is.
-    turning
-        The headings, where an antenna has a lever arm.
+    turnings
+        Heading, roll and pitch, where an antenna has a lever arm: of the inputs of these roles, and
+        those beside the fixes.
     """
 
     inflows: tuple[_Inflow, ...]
@@ -85,7 +87,7 @@ class Merging(NamedTuple):
     patience: float = np.inf
     released: float = -np.inf
     arms: tuple[Arm, ...] = ()
-    turning: Turning = Turning()
+    turnings: tuple[Turning, Turning] = (Turning(), Turning())
 
     @property
     def ended(self) -> bool:
@@ -103,7 +105,9 @@ def begin_merging(inputs: Sequence[tuple[str, str]], patience: float = np.inf) -
     """Begin to merge inputs of the given names and roles.
 
     A role is ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or
-    ``heading``, a series that is only cleaned, and carries the lever arms. An input that is more
+    ``heading`` or ``attitude``, series that are only cleaned, and carry the lever arms. The heading
+    is that of an input of the first, else of the second, else that beside the fixes; roll and pitch
+    are those of the second, else of the first, else those beside the fixes. An input that is more
     than ``patience`` seconds behind is waited for no longer; what it brings from before the rows
     that were let go is late.
     """
@@ -139,7 +143,7 @@ def merge(
     inflow, events = _order(inflow, fixes, options.reorder_s)
     if log is not None and options.lever_arm:
         inflow, merging = _turn(inflow, merging, log)
-    elif log is not None and inflow.role == "heading":
+    elif log is not None and inflow.role in _ATTITUDE:
         inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     inflows = [*merging.inflows]
     inflows[source] = inflow
@@ -181,14 +185,14 @@ def _numbered(merging: Merging, rows: Rows, options: CleanOptions) -> tuple[Merg
 
 
 def _reached(log: Log, before: float) -> float:
-    """How far an input of headings has come, s: it has no rows that would tell."""
+    """How far an input without rows has come, s."""
     return max((float(np.nanmax(c.time, initial=before)) for c in log.channels), default=before)
 
 
 def _supporting(log: Log, role: str) -> Fixes | None:
     """The fixes of a log; a depth series becomes observations of the height alone."""
     if role != "depth":
-        return None if role == "heading" else log.fixes
+        return None if role in _ATTITUDE else log.fixes
     series = _depths(log)
     if not series:
         return None
@@ -212,23 +216,27 @@ def _arm(name: str, home: str, options: CleanOptions) -> Arm:
 
 
 def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging]:
-    """Take the headings of an input for that; without one of that role those beside the fixes."""
+    """Take the angles of an input for its lever arms, but for those that another one is for."""
     roles = {each.role for each in merging.inflows}
-    if inflow.role != ("heading" if "heading" in roles else "fixes"):
-        return inflow, merging
-    turning = turned(merging.turning, log.channels, merging.released)
-    if inflow.role == "heading":
-        inflow = inflow._replace(last_tau=max(inflow.last_tau, reached(turning)))
-    return inflow, merging._replace(turning=turning)
+    left = {"heading": roles & {"heading"}, "roll": roles & {"attitude"}}
+    left["pitch"] = left["roll"]
+    names = [name for name in ANGLES if left[name] <= {inflow.role}]
+    own, beside = merging.turnings
+    if inflow.role in _ATTITUDE:
+        own = turned(own, log.channels, merging.released, names)
+        inflow = inflow._replace(last_tau=max(inflow.last_tau, reached(own, names)))
+    elif inflow.role == "fixes":
+        beside = turned(beside, log.channels, merging.released, names)
+    return inflow, merging._replace(turnings=(own, beside))
 
 
 def _with_arms(rows: Rows, merging: Merging, options: CleanOptions) -> Rows:
     arms = np.zeros((max(len(merging.arms), 1), 3))
     for k, arm in enumerate(merging.arms):
         arms[k] = arm or 0.0
-    sigma = np.radians(options.sigma_heading_deg)
-    own = arms[rows.fixes.sensor]
-    return rows._replace(lever=arms_at(merging.turning, rows.fixes.time, own, sigma))
+    sigmas = np.radians([options.sigma_heading_deg, options.sigma_attitude_deg])
+    own, time = arms[rows.fixes.sensor], rows.fixes.time
+    return rows._replace(lever=arms_at(merging.turnings, time, own, *sigmas.tolist()))
 
 
 def _depths(log: Log) -> list[Channel]:

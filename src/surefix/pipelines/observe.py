@@ -113,7 +113,8 @@ def epochs_of(
         ]
     )
     if rows.lever.shape[1]:
-        sigma[:, : len(axes)] = np.hypot(sigma[:, : len(axes)], rows.lever[:, 6:][:, axes])
+        own = np.hstack([rows.lever[:, 6:9][:, axes], rows.lever[:, 9:][:, axes]])
+        sigma = np.hypot(sigma, own)
     z[status.verdict >= 0] = np.nan
     fixed = np.full((n, motion.groups), np.nan)
     positions = int(motion.group[: len(axes)].max(initial=-1)) + 1

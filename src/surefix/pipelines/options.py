@@ -65,8 +65,8 @@ class CleanOptions:
     lever_arm
         Where antennas are, by name of a sensor or of an input: forward, starboard and up from the
         reference point, m. Positions are those of the reference point then. It takes headings.
-    sigma_heading_deg
-        Standard deviation of the heading that carries lever arms, deg.
+    sigma_heading_deg, sigma_attitude_deg
+        Standard deviation of the heading that carries lever arms, and of roll and pitch, deg.
     process
         Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
     every_s
@@ -102,6 +102,7 @@ class CleanOptions:
     sensor_delay_s: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     lever_arm: Mapping[str, Sequence[float]] = field(default_factory=lambda: MappingProxyType({}))
     sigma_heading_deg: float = 1.0
+    sigma_attitude_deg: float = 0.5
     process: float | None = None
     every_s: float | None = None
     reorder_s: float = 10.0
@@ -230,6 +231,7 @@ _POSITIVE = (
     "sigma_height",
     "sigma_velocity",
     "sigma_heading_deg",
+    "sigma_attitude_deg",
     "process",
     "every_s",
 )

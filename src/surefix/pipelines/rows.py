@@ -35,7 +35,7 @@ class Rows(NamedTuple):
     auxiliary
         (n,) True for rows of another sensor, which have no row of their own in the output.
     lever
-        (n, 9) as `surefix.pipelines.turning.arms_at`; (n, 0) where no sensor has a lever arm.
+        (n, 12) as `surefix.pipelines.turning.arms_at`; (n, 0) where no sensor has a lever arm.
     """
 
     fixes: Fixes

@@ -11,11 +11,18 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from surefix.types import FloatArray, Log
+from surefix.types import Channel, FloatArray, Log
 
-__all__ = ["QUANTITIES", "Begun", "Heard", "hear"]
+__all__ = ["ATTITUDE", "QUANTITIES", "Begun", "Heard", "hear"]
 
-QUANTITIES: Final = {"heading_deg": "heading", "depth_m": "depth", "forward_mps": "velocity"}
+ATTITUDE: Final = "attitude"
+QUANTITIES: Final = {
+    "roll_deg": ATTITUDE,
+    "pitch_deg": ATTITUDE,
+    "heading_deg": "heading",
+    "depth_m": "depth",
+    "forward_mps": "velocity",
+}
 """What a series is an observation of, by its name; other series come from a sensor of positions."""
 
 Begun = tuple[str, int, float, bool]
@@ -110,12 +117,22 @@ def hear(
         if number > before.row and math.isfinite(time):
             news = _with(before, [time], arrival) if good else before._replace(marked=time)
             known[source, name] = news._replace(row=number)
-    for channel in log.channels:
-        if (quantity := QUANTITIES.get(channel.name)) is not None:
-            before = known.get((source, channel.sensor), Heard(channel.sensor, source, quantity))
-            there = np.isfinite(channel.time) & np.isfinite(channel.value)
-            known[source, channel.sensor] = _with(before, channel.time[there].tolist(), arrival)
+    series = [each for each in log.channels if each.name in QUANTITIES]
+    for sensor in dict.fromkeys(each.sensor for each in series):
+        own = [each for each in series if each.sensor == sensor]
+        told = {QUANTITIES[each.name] for each in own}
+        quantity = ATTITUDE if ATTITUDE in told else QUANTITIES[own[0].name]
+        before = known.get((source, sensor), Heard(sensor, source, quantity))
+        known[source, sensor] = _with(before, _instants(own), arrival)
     return tuple(known.values())
+
+
+def _instants(series: Sequence[Channel]) -> list[float]:
+    """When a sensor said something, in the order of arrival; angles of one time count once."""
+    found = [each.time[np.isfinite(each.time) & np.isfinite(each.value)] for each in series]
+    longest = max(found, key=len)
+    more = [each[~np.isin(each, longest)] for each in found]
+    return [*longest.tolist(), *np.concatenate(more).tolist()]
 
 
 def _with(heard: Heard, times: list[float], arrival: float) -> Heard:

@@ -17,7 +17,7 @@ from surefix.cleaning.duplicates import stuck
 from surefix.filters.health import Health
 from surefix.pipelines.state import Session
 from surefix.reasons import clock
-from surefix.service.heard import QUANTITIES, Heard
+from surefix.service.heard import ATTITUDE, QUANTITIES, Heard
 from surefix.service.sensors import SensorState, Validity
 from surefix.types import FloatArray
 
@@ -34,6 +34,7 @@ _UPRIGHT: Final = 0.5  # … until it leans less than this
 _REJECTED: Final = 0.3  # share of rejected observations: doubtful …
 _ACCEPTED: Final = 0.2  # … until it is less than this
 _CLIPPED: Final = 3.9  # standard deviations: a mean near the largest that is counted
+_WORST: Final[tuple[Validity, ...]] = ("invalid", "doubtful", "valid")
 _SIDES: Final = (("to the east", "to the west"), ("to the north", "to the south"), ("up", "down"))
 
 
@@ -97,7 +98,7 @@ def judge_sensors(
     after = []
     for each in heard:
         name = inputs[each.source][0]
-        record = _record(session, each)
+        record, *others = _records(session, each)
         state = SensorState(
             each.name,
             name,
@@ -112,7 +113,8 @@ def judge_sensors(
         by_arrival = math.isfinite(now) and math.isfinite(each.arrived)
         age = now - each.arrived if by_arrival else newest - state.observed
         word = "" if past is None else past.word
-        validity, reason = _judged(each, record, age, word)
+        told = [_judged(each, one, age, word) for one in (record, *others)]
+        validity, reason = min(told, key=lambda verdict: _WORST.index(verdict[0]))
         after.append(_since(state._replace(validity=validity, reason=reason), past, now, newest))
     there = {each.source for each in heard}
     for source, (name, role) in enumerate(inputs):
@@ -163,17 +165,22 @@ def _since(state: SensorState, past: SensorState | None, now: float, newest: flo
     return state._replace(since=now if math.isfinite(now) else newest)
 
 
-def _record(session: Session, heard: Heard) -> _Record:
-    """What the session knows of a sensor; nothing before it is settled."""
+def _records(session: Session, heard: Heard) -> list[_Record]:
+    """What the session knows of a sensor, series by series; nothing before it is settled.
+
+    Of roll and pitch only whether they move: how much they do is the sea's affair, and a figure
+    that was settled at the quay says nothing of a sensor out there.
+    """
     if heard.name in session.sensors:
         found = _of(session.health, session.sensors.index(heard.name))
-        return found if session.repeats is None else _still(found, session, heard)
+        return [found if session.repeats is None else _still(found, session, heard)]
+    records = []
     for (sensor, name), state in session.channels.items():
         if sensor == heard.name and name in QUANTITIES and state.repeats is not None:
             since, lively = stuck(state.repeats)
-            found = _of(state.health, 0)
-            return found._replace(stuck=float(since[0]), lively=bool(lively[0]))
-    return _Record()
+            found = _Record() if QUANTITIES[name] == ATTITUDE else _of(state.health, 0)
+            records.append(found._replace(stuck=float(since[0]), lively=bool(lively[0])))
+    return records or [_Record()]
 
 
 def _still(record: _Record, session: Session, heard: Heard) -> _Record:

@@ -51,7 +51,7 @@ __all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOp
 SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
 
-_ROLES: Final = ("fixes", "depth", "heading")
+_ROLES: Final = ("fixes", "depth", "heading", "attitude")
 _INPUT: Final = {
     "name", "from", "role", "allow", "require_checksum", "target", "lever_arm",
 }  # fmt: skip
@@ -69,7 +69,7 @@ class InputOptions:
     address
         Where it is read from.
     role
-        ``fixes``, ``depth`` (supports the fixes), or ``heading`` (only cleaned).
+        ``fixes``, ``depth`` (supports the fixes), ``heading`` or ``attitude`` (carry lever arms).
     allow
         Networks that datagrams and clients may come from; empty: any.
     require_checksum

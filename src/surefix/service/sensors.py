@@ -18,7 +18,7 @@ class SensorState(NamedTuple):
     name, input
         Of the sensor, and of the input it came through.
     quantity
-        ``position``, ``velocity``, ``depth`` or ``heading``.
+        ``position``, ``velocity``, ``depth``, ``heading`` or ``attitude``.
     validity, reason
         The judgement, and why; empty when valid. The reason begins with one word: ``silent``,
         ``stale``, ``frozen``, ``jumping``, ``biased`` or ``noisy``.

@@ -19,7 +19,7 @@ __all__ = ["FRESH", "series_at", "with_few_series"]
 FRESH: Final = 3.0
 """s that a value of a series is carried on by its rate, after which it is not known any more."""
 
-_ROLES: Final = {"heading_deg": "heading", "depth_m": "depth"}
+_ROLES: Final = {"heading_deg": ("heading", "attitude"), "depth_m": ("depth",)}
 
 
 def with_few_series(session: Session) -> Session:
@@ -61,17 +61,22 @@ def series_at(
             else:
                 values.pop((series.sensor, series.name), None)
     told = dict.fromkeys(_ROLES, math.nan)
-    for name, role in _ROLES.items():
-        stems = [f"{Path(n).stem} " for n, r in zip(names, roles, strict=True) if r == role]
+    stems = [(f"{Path(name).stem} ", role) for name, role in zip(names, roles, strict=True)]
+    for name, ranked in _ROLES.items():
         told[name] = _first(
-            (value, any(sensor.startswith(stem) for stem in stems))
+            (value, [role for stem, role in stems if sensor.startswith(stem)], ranked)
             for (sensor, kind), value in values.items()
             if kind == name
         )
     return told
 
 
-def _first(found: Iterable[tuple[float, bool]]) -> float:
-    """Of values and whether they are preferred, the first preferred one, or the first."""
-    ranked = sorted(found, key=lambda each: not each[1])
-    return ranked[0][0] if ranked else math.nan
+def _first(found: Iterable[tuple[float, list[str], tuple[str, ...]]]) -> float:
+    """Of values, their roles and the roles by preference, the preferred one, or the first."""
+
+    def rank(each: tuple[float, list[str], tuple[str, ...]]) -> int:
+        _, roles, ranked = each
+        return min((ranked.index(role) for role in roles if role in ranked), default=len(ranked))
+
+    best = sorted(found, key=rank)
+    return best[0][0] if best else math.nan
