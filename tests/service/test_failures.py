@@ -7,7 +7,8 @@ import pytest
 
 from service.receivers import START, Ship, _patient, gga, sail, service_of  # noqa: F401
 from surefix.service.alarms import active
-from surefix.service.live import acknowledge, begin_live
+from surefix.service.live import begin_live
+from surefix.service.supervision import acknowledge
 
 SHIP = Ship(200.0)
 FIRST, LAST = 90, 140  # s, between which a receiver fails

@@ -25,7 +25,7 @@ __all__ = ["Change", "Lively", "begin_lively", "follow"]
 
 _STEP: Final = 30  # epochs after which it is looked again
 _SCALES: Final = (1, 2, 4, 8)  # steps that are looked back over, each for itself
-_FAR: Final = 5.0  # standard deviations of the sum of products that call for an estimate
+_FAR: Final = 4.0  # standard deviations of the sum of products that call for an estimate
 _WINDOW: Final = 120  # epochs it is made on
 _LARGEST: Final = 3.0  # no standardised innovation counts for more
 _DOWN, _UP = 1e-8, 100.0  # far below and far above, as variances
@@ -34,8 +34,8 @@ _FINE: Final = 1.5 ** np.array([-4.0, -2.0, 2.0, 4.0])  # … and those about th
 _GAIN: Final = 10.0  # log-likelihood that is worth a change
 _BRIEFLY: Final = 16  # hypotheses that it is found with …
 _BEGIN: Final = 3  # … but for the first epochs
-_LOUDER: Final = 1.5  # after an estimate that changed nothing, factor on what calls for the next …
-_LOUDEST: Final = 60.0  # … standard deviations at most …
+_LOUDER: Final = 1.25  # after an estimate that changed nothing, factor on what calls for the next …
+_LOUDEST: Final = 15.0  # … standard deviations at most …
 _PAUSE: Final = 20_000  # … for so many epochs at most
 
 State = TypeVar("State")
@@ -72,10 +72,10 @@ class Lively(NamedTuple):
     last
         (m,) the last standardised innovation of each component; NaN before the first.
     products
-        (n, blocks, 2, 2) sums of products of neighbouring innovations, of positions and of
-        velocities, and how many, at the epochs of the step that is not complete.
+        (n, blocks, 2, 3) sums of products of neighbouring innovations, of positions and of
+        velocities, of their squares, and how many, at the epochs of the step not complete.
     steps
-        (8, blocks, 2, 2) the same of the steps before, whole.
+        (8, blocks, 2, 3) the same of the steps before, whole.
     level, rest, pause
         (blocks,) standard deviations of the sum of products that call for an estimate, for how
         many steps they are more than usual, and for how many they will be the next time.
@@ -99,8 +99,8 @@ def begin_lively(motion: Motion, blocks: int) -> Lively:
         motion.density.copy(),
         Epochs(np.empty(0), none, none, np.empty((0, motion.groups)), whole),
         np.full(m, np.nan),
-        np.zeros((0, blocks, 2, 2)),
-        np.zeros((_SCALES[-1], blocks, 2, 2)),
+        np.zeros((0, blocks, 2, 3)),
+        np.zeros((_SCALES[-1], blocks, 2, 3)),
         np.full(blocks, _FAR),
         np.zeros(blocks, np.int64),
         np.full(blocks, _WINDOW // _STEP),
@@ -175,9 +175,9 @@ def _joined(parts: list[Estimate]) -> Estimate:
 def _products(
     lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, blocks, 2, 2) sums and counts at each epoch, the open step first; and (m,) the last."""
+    """(n, blocks, 2, 3) sums and counts at each epoch, the open step first; and (m,) the last."""
     used, d = np.isfinite(found.standardised), motion.axes
-    out = np.zeros((len(used), len(blocks), 2, 2))
+    out = np.zeros((len(used), len(blocks), 2, 3))
     last = lively.last.copy()
     for b, axes in enumerate(blocks):
         for c in (*axes, *(d + a for a in axes)):
@@ -185,14 +185,14 @@ def _products(
             values = np.clip(found.standardised[rows, c], -_LARGEST, _LARGEST)
             before = np.concatenate([[last[c]], values])[:-1]
             known = np.isfinite(before)
-            out[rows[known], b, c // d, 0] += (values * before)[known]
-            out[rows[known], b, c // d, 1] += 1.0
+            product = (values * before)[known]
+            out[rows[known], b, c // d] += np.column_stack((product, product**2, known[known]))
             last[c] = values[-1] if len(values) else last[c]
     return np.concatenate([lively.products, out]), last
 
 
 def _steps(lively: Lively, products: FloatArray) -> FloatArray:
-    """(8 + n, blocks, 2, 2) sums over the steps before, and over those now whole."""
+    """(8 + n, blocks, 2, 3) sums over the steps before, and over those now whole."""
     whole = len(products) // _STEP
     each = products[: whole * _STEP].reshape(whole, _STEP, *products.shape[1:])
     total = np.zeros((whole, *products.shape[1:]))
@@ -212,7 +212,7 @@ def _asked(
     steps, most = _steps(lively, products), _SCALES[-1]
     number = len(steps) - most
     far = np.zeros((number, len(blocks)))
-    total = np.zeros((number, len(blocks), 2, 2))
+    total = np.zeros((number, len(blocks), 2, 3))
     for k in range(most):
         total += steps[most - k : most - k + number]
         if k + 1 in _SCALES:
@@ -227,12 +227,13 @@ def _asked(
 
 
 def _far(total: FloatArray) -> FloatArray:
-    """(n, blocks) standard deviations that sums (n, blocks, 2, 2) lie above nought.
+    """(n, blocks) standard deviations that sums (n, blocks, 2, 3) lie above nought.
 
-    Beside velocities these are asked alone: fixes that wander off from them are no motion.
+    They are those of the products themselves: wild fixes make them large, but of any sign. Beside
+    velocities these are asked alone: fixes that wander off from them are no motion.
     """
     positions, velocities = total[..., 0, :], total[..., 1, :]
-    aided = 2.0 * velocities[..., 1:] >= np.maximum(positions[..., 1:], 1.0)
+    aided = 2.0 * velocities[..., 2:] >= np.maximum(positions[..., 2:], 1.0)
     asked = np.where(aided, velocities, positions + velocities)
     return np.asarray(asked[..., 0] / np.sqrt(np.maximum(asked[..., 1], 1.0)))
 
