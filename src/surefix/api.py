@@ -27,6 +27,7 @@ def clean(
     depth: Data | None = None,
     velocity: Data | None = None,
     heading: Data | None = None,
+    ship: Sequence[Data] = (),
     columns: Mapping[str, str] | None = None,
     target: str | None = None,
     edits: str | Path | None = None,
@@ -43,6 +44,9 @@ def clean(
         modified.
     depth, velocity, heading
         Other sensors, each of the same kinds, with their own clocks and rates.
+    ship
+        Logs with position and heading of the ship that an acoustic positioning system is on, where
+        they are not in its own log; the one to be preferred first.
     columns
         What columns mean where their names do not say it: ``{"time": "lcm_timestamp:us"}``.
     target
@@ -70,6 +74,7 @@ def clean(
         depth=depth,
         velocity=velocity,
         heading=heading,
+        ship=ship,
         columns=columns,
         target=target,
     )

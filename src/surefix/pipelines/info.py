@@ -28,6 +28,7 @@ def describe(
     depth: str | Path | None = None,
     velocity: str | Path | None = None,
     heading: str | Path | None = None,
+    ship: Sequence[str | Path] = (),
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     target: str | None = None,
@@ -37,7 +38,7 @@ def describe(
 
     Parameters
     ----------
-    inputs, depth, velocity, heading, columns, require_checksum, target, progress
+    inputs, depth, velocity, heading, ship, columns, require_checksum, target, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
@@ -46,6 +47,7 @@ def describe(
         depth=depth,
         velocity=velocity,
         heading=heading,
+        ship=ship,
         columns=columns,
         require_checksum=require_checksum,
         target=target,
@@ -69,12 +71,13 @@ def describe(
         "problems": found["problems"],
         "command": _command(
             inputs,
-            {
-                "--depth": depth,
-                "--velocity": velocity,
-                "--heading": heading,
-                "--target": target,
-            },
+            [
+                ("--depth", depth),
+                ("--velocity", velocity),
+                ("--heading", heading),
+                *(("--ship", path) for path in ship),
+                ("--target", target),
+            ],
             columns,
             require_checksum,
         ),
@@ -141,14 +144,14 @@ def _rounded(value: float) -> float | None:
 
 def _command(
     inputs: Sequence[str | Path],
-    others: Mapping[str, str | Path | None],
+    others: Sequence[tuple[str, str | Path | None]],
     columns: Mapping[str, str] | None,
     require_checksum: bool,
 ) -> str:
     """The `clean` command that fits these inputs."""
     stem = Path(inputs[0]).stem
     words = ["surefix", "clean", *(str(path) for path in inputs)]
-    for option, path in others.items():
+    for option, path in others:
         words += [option, str(path)] if path is not None else []
     for role, column in (columns or {}).items():
         words += ["--column", f"{role}={column}"]

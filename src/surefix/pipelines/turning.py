@@ -1,9 +1,10 @@
-"""Where antennas are on a vehicle that turns: lever arms, carried by its heading.
+"""What the heading of a vehicle turns: its lever arms, and the velocities along its own axes.
 
 An antenna that is mounted away from the reference point describes a circle when the vehicle turns.
 With the heading at the time of a fix its offset is known, to the uncertainty of the heading times
-its distance; without one it is not, and the distance itself is the uncertainty. The vehicle is
-taken to be level: its roll and pitch are noise to a fix, and are estimated as such.
+its distance; without one it is not, and the distance itself is the uncertainty. A velocity along
+the axes of the vehicle says where it goes only with the heading. The vehicle is taken to be level:
+its roll and pitch are noise to a fix or a velocity, and are estimated as such.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ import numpy as np
 from surefix.geo.angle import wrap
 from surefix.types import BoolArray, Channel, FloatArray
 
-__all__ = ["Arm", "Turning", "arms_at", "reached", "turned"]
+__all__ = ["Arm", "Turning", "arms_at", "azimuth_at", "reached", "turned"]
 
 Arm = tuple[float, ...]
 """Forward, starboard and up, m, from the reference point to the antenna; empty: there is none."""
 
 _KEPT: Final = 120.0  # s of headings that are kept
 _AWAY: Final = 2.0  # s between a heading and a fix that are too many
+_BESIDE: Final = 10.0  # s between two headings that still turn a velocity between them
 _DRIFT: Final = math.radians(1.0)  # rad/s that a heading may change unseen
 _SPAN: Final = 0.5  # s before and after, over which the rate of turn is taken
 
@@ -83,7 +85,7 @@ def arms_at(
         (n, 9) east, north, up: offset of the antenna from the reference point, m, its velocity due
         to the rate of turn, m/s, and standard deviation of the offset, m.
     """
-    heading, rate, away = _heading_at(turning, time)
+    heading, rate, away, _ = _heading_at(turning, time, _AWAY)
     forward, starboard, up = arms.T
     sine, cosine = np.sin(heading), np.cos(heading)
     east, north = forward * sine + starboard * cosine, forward * cosine - starboard * sine
@@ -98,16 +100,39 @@ def arms_at(
     return lever
 
 
-def _heading_at(turning: Turning, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Heading, rad, rate of turn, rad/s, and time to the farther of the headings beside it, s.
+def azimuth_at(turning: Turning, time: FloatArray) -> FloatArray:
+    """Headings at given times, rad: between two at most 10 s apart, or up to 2 s after the last.
+
+    Parameters
+    ----------
+    turning
+        The headings there are.
+    time
+        (n,) s.
+
+    Returns
+    -------
+    heading
+        (n,) clockwise from north; NaN where it is not known.
+    """
+    heading, _, away, beyond = _heading_at(turning, time, _BESIDE)
+    return np.where((away <= _BESIDE) & (beyond <= _AWAY), heading, np.nan)
+
+
+def _heading_at(
+    turning: Turning, time: FloatArray, gap: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Heading, rad, rate of turn, rad/s, time to the farther of the headings beside it, s.
+
+    And how long there has been none, s; two that are more than ``gap`` apart have a gap between.
 
     Only headings near by are looked at, and none behind a gap: the numbers depend neither on where
     the headings begin nor on whether they go on after it. A turn goes on into a gap.
     """
     n, known = len(time), turning.time
     if len(known) < 2:
-        return np.zeros(n), np.zeros(n), np.full(n, np.inf)
-    together = np.diff(known) <= _AWAY
+        return np.zeros(n), np.zeros(n), np.full(n, np.inf), np.zeros(n)
+    together = np.diff(known) <= gap
     heading = _without_spikes(turning.heading, together)
     place = np.arange(len(known))
     begins = np.maximum.accumulate(np.where(np.append(False, together), 0, place))
@@ -123,7 +148,7 @@ def _heading_at(turning: Turning, time: FloatArray) -> tuple[FloatArray, FloatAr
     right = np.where(beyond > 0.0, 0.0, known[np.minimum(at + 1, len(known) - 1)] - time)
     away = np.where(left == 0.0, 0.0, np.maximum(left, right))
     heading = _between(known, heading, np.minimum(time, stop)) + rate * beyond
-    return heading, rate, np.where(time >= known[0], away, np.inf)
+    return heading, rate, np.where(time >= known[0], away, np.inf), beyond
 
 
 def _between(known: FloatArray, heading: FloatArray, time: FloatArray) -> FloatArray:

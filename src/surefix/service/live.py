@@ -120,7 +120,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.task) for each in options.inputs])
+    journal.begin([(each.name, str(each.task)) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:
@@ -266,7 +266,7 @@ def acknowledge(live: Live, number: int, by: str, now: float) -> bool:
 def _judge(live: Live, now: float) -> None:
     """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
     session = live.station.session if live.ahead is None else live.ahead.session
-    inputs = [(each.name, each.role) for each in live.options.inputs]
+    inputs = [(each.name, each.roles[0]) for each in live.options.inputs]
     at = math.nan if _recorded(live) else now
     live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
     _heed(live, now)

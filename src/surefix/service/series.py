@@ -62,7 +62,8 @@ def series_at(
                 values.pop((series.sensor, series.name), None)
     told = dict.fromkeys(_ROLES, math.nan)
     for name, role in _ROLES.items():
-        stems = [f"{Path(n).stem} " for n, r in zip(names, roles, strict=True) if r == role]
+        own = (role, "turning") if role == "heading" else (role,)
+        stems = [f"{Path(n).stem} " for n, r in zip(names, roles, strict=True) if r in own]
         told[name] = _first(
             (value, any(sensor.startswith(stem) for stem in stems))
             for (sensor, kind), value in values.items()
