@@ -189,7 +189,8 @@ class Log:
     """True where the third axis was given as a depth (height = −depth)."""
     axes: str = ""
     """Of positions that are yet to be placed by where the ship was: ``ship`` (x to starboard, y
-    ahead), ``north`` (x east, y north of it), ``?`` as long as there are none."""
+    ahead), ``north`` (x east, y north of it). ``?``: not known yet; ``wait``: nor is it known of
+    positions that wait for that."""
 
 
 class Reason(IntEnum):

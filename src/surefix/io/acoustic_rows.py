@@ -59,10 +59,11 @@ class Sightings:
 
     @property
     def axes(self) -> str:
-        """What the rows are in, as far as the ship has yet to place them; ``?``: not known yet."""
+        """What the rows are in, as ``Log.axes``."""
         if self.plan is None:
-            return "?"
-        return self.plan.place if self.plan.place in ("ship", "north") else ""
+            return "wait" if self._waiting else "?"
+        left = self._apart and self.plan.place in ("ship", "north")
+        return self.plan.place if left else ""
 
     @property
     def count(self) -> int:

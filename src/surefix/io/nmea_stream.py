@@ -263,7 +263,7 @@ class NmeaStream:
             events=tuple(self._events()),
             counts=self._counts,
             depth_positive_down=self._sightings is not None,
-            axes=self._sightings.axes if self._apart and self._sightings is not None else "",
+            axes=self._sightings.axes if self._sightings is not None else "",
         )
         self._channels, self._problems, self._counts = Series(), {}, {}
         self._clock.settle()

@@ -25,14 +25,14 @@ from surefix.pipelines.rows import (
     take_rows,
 )
 from surefix.pipelines.supporting import BODY, NOT_CLEANED, no_heading, steered, support
-from surefix.pipelines.turning import Arm, Turning, arms_at, reached, turned
+from surefix.pipelines.turning import Arm, Turning, arms_at, reached, settled, turned
 from surefix.types import PLACE, Channel, Event, Fixes, FloatArray, Log, Problem
 
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
 
 _WITH_CHANNELS = ("fixes", "heading", "ship")  # roles whose series are cleaned beside the track
 _HEADINGS = ("heading", "turning")  # roles whose headings are those of the vehicle
-_WAITS = 300.0  # s that a live stream may be behind the others and still be placed
+_WAITS = 300.0  # s that sightings of a live stream may wait for what they are in
 _NO_VELOCITY = "a table with velocities, or a log of a DVL; a receiver is an input of fixes"
 _NO_SERIES = (NOT_CLEANED, *PLACE)  # what only goes with another series is not one
 
@@ -51,7 +51,8 @@ class _Inflow(NamedTuple):
     """Where one input stands: its sensors and clock, rows held back by it, and rows in order.
 
     In its rows a sensor has its number in ``sensors`` here. ``axes`` says in which axes they are
-    until they are let go: as ``Log.axes``, or the vehicle's own; ``ship`` is what it tells of that.
+    until they are let go: as ``Log.axes``, or the vehicle's own; ``waits`` that there are some of
+    which that is not known yet; ``ship`` is what it tells of the ship.
     """
 
     name: str
@@ -63,14 +64,14 @@ class _Inflow(NamedTuple):
     last_tau: float = -np.inf
     longitude: float = np.nan
     ended: bool = False
+    waits: bool = False
     axes: str = ""
     ship: tuple[Told, ...] = ()
 
     @property
     def reach(self) -> float:
         """Time up to which it brings nothing new, s, but for rows that are late."""
-        until = known_until(self.ship) if self.ship else np.inf
-        return until if self.role == "ship" else min(self.last_tau, until)
+        return min(self.last_tau, known_until(self.ship) if self.ship else np.inf)
 
 
 class Merging(NamedTuple):
@@ -142,6 +143,8 @@ def merge(
         How far out of order a row may be, and how much too late the times of a sensor are.
     """
     inflow = merging.inflows[source]._replace(ended=log is None)
+    if log is not None and inflow.role == "fixes":
+        inflow = inflow._replace(waits=log.axes == "wait")
     brought = support(log, inflow.role) if log is not None else None
     fixes = None if brought is None else brought.fixes
     if fixes is not None and brought is not None:
@@ -236,7 +239,8 @@ def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging
         return inflow, merging
     turning = turned(merging.turning, log.channels, merging.released)
     if inflow.role in _HEADINGS:
-        inflow = inflow._replace(last_tau=max(inflow.last_tau, reached(turning)))
+        until = min(reached(turning), settled(turning))
+        inflow = inflow._replace(last_tau=max(inflow.last_tau, until))
     return inflow, merging._replace(turning=turning)
 
 
@@ -297,7 +301,9 @@ def _release(
     An input that is behind ``least`` is not waited for. The sensors of all inputs are numbered
     through. What is in axes of its own is turned, or put on the Earth, and counted where it cannot.
     """
-    waits = (max(inflow.reach, least) for inflow in inflows if not inflow.ended)
+    waits = (
+        max(inflow.reach, least - _WAITS * inflow.waits) for inflow in inflows if not inflow.ended
+    )
     until = min(waits, default=np.inf)
     out: list[Rows] = []
     keys: list[FloatArray] = []

@@ -51,7 +51,7 @@ class Support(NamedTuple):
 def support(log: Log, role: str) -> Support:
     """What a part of an input of a role brings for the track."""
     if role == "fixes":
-        return Support(log.fixes, log.sensors, log.axes.strip("?"))
+        return Support(log.fixes, log.sensors, log.axes if log.fixes is not None else "")
     if role == "depth":
         return _depths(log)
     return _velocities(log) if role == "velocity" else Support(None, ())

@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from surefix.geo.angle import wrap
-from surefix.types import BoolArray, Channel, FloatArray
+from surefix.types import BoolArray, Channel, FloatArray, IntArray
 
-__all__ = ["Arm", "Turning", "arms_at", "azimuth_at", "reached", "turned"]
+__all__ = ["Arm", "Turning", "arms_at", "azimuth_at", "reached", "settled", "turned"]
 
 Arm = tuple[float, ...]
 """Forward, starboard and up, m, from the reference point to the antenna; empty: there is none."""
@@ -27,6 +27,8 @@ _KEPT: Final = 120.0  # s of headings that are kept
 _AWAY: Final = 2.0  # s between a heading and a fix that are too many
 _BESIDE: Final = 10.0  # s between two headings that still turn a velocity between them
 _DRIFT: Final = math.radians(1.0)  # rad/s that a heading may change unseen
+_MEDIAN: Final = 1.0  # s before and after, over which the heading that turns a velocity is typical
+_INSTANTS: Final = 11  # at which it is looked at there
 _SPAN: Final = 0.5  # s before and after, over which the rate of turn is taken
 
 
@@ -85,7 +87,7 @@ def arms_at(
         (n, 9) east, north, up: offset of the antenna from the reference point, m, its velocity due
         to the rate of turn, m/s, and standard deviation of the offset, m.
     """
-    heading, rate, away, _ = _heading_at(turning, time, _AWAY)
+    heading, rate, away = _heading_at(turning, time)
     forward, starboard, up = arms.T
     sine, cosine = np.sin(heading), np.cos(heading)
     east, north = forward * sine + starboard * cosine, forward * cosine - starboard * sine
@@ -103,6 +105,9 @@ def arms_at(
 def azimuth_at(turning: Turning, time: FloatArray) -> FloatArray:
     """Headings at given times, rad: between two at most 10 s apart, or up to 2 s after the last.
 
+    Each is the median of those within a second, so that less than a second of wrong ones does
+    nothing; near a gap and at the ends of as many as there are on either side.
+
     Parameters
     ----------
     turning
@@ -115,24 +120,62 @@ def azimuth_at(turning: Turning, time: FloatArray) -> FloatArray:
     heading
         (n,) clockwise from north; NaN where it is not known.
     """
-    heading, _, away, beyond = _heading_at(turning, time, _BESIDE)
-    return np.where((away <= _BESIDE) & (beyond <= _AWAY), heading, np.nan)
+    known = turning.time
+    if len(known) < 2:
+        return np.full(len(time), np.nan)
+    at = np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)
+    after = np.minimum(at + 1, len(known) - 1)
+    gap, past = known[after] - known[at], time - known[at]
+    heading, following = _typical(turning, at), _typical(turning, after)
+    between = (gap > 0.0) & (gap <= _BESIDE)
+    share = np.where(between, past / np.where(between, gap, 1.0), 0.0)
+    begins, _ = _stretch(known, at)
+    earlier = np.maximum(np.searchsorted(known, known[at] - _SPAN, side="right") - 1, begins)
+    swept, lasted = _wrapped(heading - _typical(turning, earlier)), known[at] - known[earlier]
+    rate = np.where(lasted > 0.0, swept / np.where(lasted > 0.0, lasted, 1.0), 0.0)
+    moved = np.where(between, share * _wrapped(following - heading), rate * past)
+    there = (past >= 0.0) & (between | (past <= _AWAY))
+    return np.where(there, heading + moved, np.nan)
 
 
-def _heading_at(
-    turning: Turning, time: FloatArray, gap: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Heading, rad, rate of turn, rad/s, time to the farther of the headings beside it, s.
+def settled(turning: Turning) -> float:
+    """Time up to which another heading changes nothing that `azimuth_at` says, s."""
+    known = turning.time
+    sure = known[known <= known[-1] - _MEDIAN] if len(known) else known
+    return float(sure[-1]) if len(sure) else -math.inf
 
-    And how long there has been none, s; two that are more than ``gap`` apart have a gap between.
+
+def _stretch(known: FloatArray, index: IntArray) -> tuple[IntArray, IntArray]:
+    """First and last heading of the stretch without a gap that some headings lie in."""
+    cuts = np.flatnonzero(np.diff(known) > _BESIDE) + 1
+    bounds = np.concatenate([[0], cuts, [len(known)]])
+    stretch = np.searchsorted(bounds, index, side="right") - 1
+    return bounds[stretch], bounds[stretch + 1] - 1
+
+
+def _typical(turning: Turning, index: IntArray) -> FloatArray:
+    """Median of the headings within a second of some of them, at as many instants on each side."""
+    known, own = turning.time, turning.heading[index]
+    first, last = _stretch(known, index)
+    here = known[index]
+    wide = np.minimum(_MEDIAN, np.minimum(here - known[first], known[last] - here))
+    instants = here[:, None] + wide[:, None] * np.linspace(-1.0, 1.0, _INSTANTS)
+    right = np.clip(np.searchsorted(known, instants), first[:, None], last[:, None])
+    left = np.maximum(right - 1, first[:, None])
+    nearest = np.where(instants - known[left] <= known[right] - instants, left, right)
+    return own + np.median(_wrapped(turning.heading[nearest] - own[:, None]), axis=1)
+
+
+def _heading_at(turning: Turning, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Heading, rad, rate of turn, rad/s, and time to the farther of the headings beside it, s.
 
     Only headings near by are looked at, and none behind a gap: the numbers depend neither on where
     the headings begin nor on whether they go on after it. A turn goes on into a gap.
     """
     n, known = len(time), turning.time
     if len(known) < 2:
-        return np.zeros(n), np.zeros(n), np.full(n, np.inf), np.zeros(n)
-    together = np.diff(known) <= gap
+        return np.zeros(n), np.zeros(n), np.full(n, np.inf)
+    together = np.diff(known) <= _AWAY
     heading = _without_spikes(turning.heading, together)
     place = np.arange(len(known))
     begins = np.maximum.accumulate(np.where(np.append(False, together), 0, place))
@@ -148,7 +191,7 @@ def _heading_at(
     right = np.where(beyond > 0.0, 0.0, known[np.minimum(at + 1, len(known) - 1)] - time)
     away = np.where(left == 0.0, 0.0, np.maximum(left, right))
     heading = _between(known, heading, np.minimum(time, stop)) + rate * beyond
-    return heading, rate, np.where(time >= known[0], away, np.inf), beyond
+    return heading, rate, np.where(time >= known[0], away, np.inf)
 
 
 def _between(known: FloatArray, heading: FloatArray, time: FloatArray) -> FloatArray:
