@@ -18,7 +18,7 @@ class Dive:
     ``outages`` are spans of seconds in which an instrument is silent, by name.
     """
 
-    def __init__(self, seed, seconds=150, outages=None):
+    def __init__(self, seed, seconds=100, outages=None):
         self.rng = np.random.default_rng(seed)
         self.seconds, self.outages = seconds, outages or {}
         self.phase = self.rng.uniform(0.0, 6.0)
@@ -112,7 +112,7 @@ class Dive:
             time = k / 4 + 0.03
             at = DAY + START + time
             side = 0.1 * math.sin(time / 9.0 + self.phase)
-            valid = not 60.0 <= time < 70.0 and self.rng.random() > 0.05
+            valid = not 40.0 <= time < 50.0 and self.rng.random() > 0.05
             said = {"vx": 0.8 + self.noise(0.01), "vy": side + self.noise(0.01), "vz": 0.0}
             text = dvl(at + 0.1, at, valid, **(said if valid else {"vx": 0.0, "fom": 10.0}))
             out.append((at + 0.12, text))
@@ -155,13 +155,11 @@ class Dive:
             for at, text in self.lines[name]
         ]
         pieces = []
-        for at, source, text in coming:
+        for at, source, text in sorted(coming):
             cut = int(rng.integers(1, len(text))) if rng.random() < 0.3 else len(text)
-            pieces.append((at, source, text[:cut]))
-            pieces.append((at + 0.005, source, text[cut:]))  # the next line comes later than that
-        there = sorted(piece for piece in pieces if piece[2])
-        there += [(math.nan, source, b"") for source in range(len(names))]
-        return [Received(n, source, at, data) for n, (at, source, data) in enumerate(there, 1)]
+            pieces += [(at, source, part) for part in (text[:cut], text[cut:]) if part]
+        pieces += [(math.nan, source, b"") for source in range(len(names))]
+        return [Received(n, source, at, data) for n, (at, source, data) in enumerate(pieces, 1)]
 
     def errors(self, track, since=20.0):
         """Horizontal errors of a track, m, after so many seconds."""

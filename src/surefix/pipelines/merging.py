@@ -321,10 +321,10 @@ def _release(
         stay = (key >= until) & (len(inflows) > 1) & (until < np.inf)
         after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
         free = take_rows(rows, ~stay)
-        if inflow.axes == BODY:
+        if inflow.axes == BODY and len(free.tau):
             free, more = steered(free, merging.turning, inflow.sensors[0])
             problems += more
-        elif inflow.axes:
+        elif inflow.axes and len(free.tau):
             free, more = escorted(free, inflow.axes, told, inflow.sensors[0])
             problems += more
         out.append(free._replace(fixes=free.fixes._replace(sensor=free.fixes.sensor + own)))

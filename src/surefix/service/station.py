@@ -285,9 +285,10 @@ def _with(log: Log, time: float) -> Log:
 
 
 def _observed(batches: Sequence[Cleaned], before: float) -> float:
-    """Time of the last fix that was used."""
+    """Time of the last fix that was used; of a sighting that has no place the depth may be."""
     for batch in batches:
         used = np.isin(batch.verdicts.verdict, (Verdict.USED, Verdict.DOWNWEIGHTED))
+        used &= np.isfinite(batch.raw_position[:, :2]).any(axis=1)
         before = float(np.fmax.reduce(batch.track.time[used], initial=before))
     return before
 
