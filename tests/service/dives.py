@@ -1,4 +1,4 @@
-"""A simulated dive: a ship that turns, a vehicle below it, and instruments on lines of their own."""
+"""A simulated dive: a ship that turns, a vehicle below it, each instrument on its own line."""
 
 import math
 
@@ -18,7 +18,7 @@ class Dive:
     ``outages`` are spans of seconds in which an instrument is silent, by name.
     """
 
-    def __init__(self, seed, seconds=100, outages=None):
+    def __init__(self, seed, seconds=80, outages=None):
         self.rng = np.random.default_rng(seed)
         self.seconds, self.outages = seconds, outages or {}
         self.phase = self.rng.uniform(0.0, 6.0)
@@ -94,25 +94,25 @@ class Dive:
 
     def gyro(self):
         return self.sent(
-            (0.0, k / 5, f"HEHDT,{self.ship(k / 5)[2]:.4f},T") for k in range(5 * self.seconds)
+            (0.0, k / 2, f"HEHDT,{self.ship(k / 2)[2]:.4f},T") for k in range(2 * self.seconds)
         )
 
     def compass(self):
-        """Of the vehicle, 5 times a second, with noise, and single spikes."""
+        """Of the vehicle, 4 times a second, with noise, and single spikes."""
         out = []
-        for k in range(5 * self.seconds):
-            said = (self.heading(k / 5) + self.noise(0.3) + (90.0 if k % 97 == 50 else 0.0)) % 360.0
-            out.append((0.0, k / 5, f"HCHDT,{said:.2f},T"))
+        for k in range(4 * self.seconds):
+            said = (self.heading(k / 4) + self.noise(0.3) + (90.0 if k % 97 == 50 else 0.0)) % 360.0
+            out.append((0.0, k / 4, f"HCHDT,{said:.2f},T"))
         return self.sent(out)
 
     def dvl(self):
-        """Four times a second; without bottom for 10 s, and invalid now and then."""
+        """Twice a second; without bottom for 7 s, and invalid now and then."""
         out = []
-        for k in range(4 * self.seconds):
-            time = k / 4 + 0.03
+        for k in range(2 * self.seconds):
+            time = k / 2 + 0.03
             at = DAY + START + time
             side = 0.1 * math.sin(time / 9.0 + self.phase)
-            valid = not 40.0 <= time < 50.0 and self.rng.random() > 0.05
+            valid = not 35.0 <= time < 42.0 and self.rng.random() > 0.05
             said = {"vx": 0.8 + self.noise(0.01), "vy": side + self.noise(0.01), "vz": 0.0}
             text = dvl(at + 0.1, at, valid, **(said if valid else {"vx": 0.0, "fom": 10.0}))
             out.append((at + 0.12, text))
@@ -123,8 +123,8 @@ class Dive:
 
     def depths(self):
         return self.sent(
-            (0.0, k / 2, f"SDDPT,{self.depth(k / 2) + self.noise(0.05):.2f},0.0")
-            for k in range(2 * self.seconds)
+            (0.0, k, f"SDDPT,{self.depth(k) + self.noise(0.05):.2f},0.0")
+            for k in range(self.seconds)
         )
 
     def noise(self, sigma):
