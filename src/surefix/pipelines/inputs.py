@@ -76,7 +76,7 @@ def open_inputs(
             sources += _journalled(journal, require_checksum)
         else:
             sources.append(Source(opener.open(data, "fixes"), "fixes", _name(data)))
-    sources += [Source(opener.open(data, "fixes", SHIP), SHIP, _name(data, SHIP)) for data in ship]
+    sources += [Source(opener.open_ship(data), SHIP, _name(data, SHIP)) for data in ship]
     if depth is not None:
         sources.append(Source(opener.open(depth, "depth"), "depth", _name(depth, "depth")))
     if heading is not None:
@@ -156,6 +156,16 @@ class _Opener:
         except (ParseError, OptionsError):
             return self._open(data, role, own, task)
 
+    def open_ship(self, data: Data) -> Iterator[Log]:
+        """Open a log of the ship; a table may have its heading alone."""
+        try:
+            return self.open(data, "fixes", SHIP)
+        except ParseError as error:
+            try:
+                return self.open(data, "heading", SHIP)
+            except ParseError:
+                raise error from None
+
     def _own(self, role: str) -> dict[str, str]:
         if role == "fixes":
             return {key: column for key, column in self._columns.items() if "." not in key}
@@ -172,7 +182,7 @@ class _Opener:
             columns=columns,
             require_checksum=self._require_checksum,
             target={"fixes": self._target, SHIP: SHIP}.get(task),
-            apart=self._apart and role == "fixes",
+            apart=self._apart and task in ("fixes", SHIP),
             progress=self._next_progress(),
         )
 
