@@ -168,7 +168,7 @@ def merge(
         if each.held is not None and not each.ended and each.last_tau < least < np.inf:
             inflows[i], more = _order(each, None, options.reorder_s, least)
             events = (*events, *more)
-    inflows, rows, released, problems = _release(inflows, merging, least)
+    inflows, rows, released, problems = _release(inflows, merging, least, options)
     after = merging._replace(inflows=tuple(inflows), released=released)
     if rows is not None:
         after, rows = _numbered(after, rows, options)
@@ -294,7 +294,7 @@ def _place(inflow: _Inflow, fixes: Fixes | None) -> tuple[_Inflow, FloatArray]:
 
 
 def _release(
-    inflows: list[_Inflow], merging: Merging, least: float
+    inflows: list[_Inflow], merging: Merging, least: float, options: CleanOptions
 ) -> tuple[list[_Inflow], Rows | None, float, tuple[Problem, ...]]:
     """Merge the ready rows that no input can still precede; also tells up to when.
 
@@ -322,7 +322,8 @@ def _release(
         after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
         free = take_rows(rows, ~stay)
         if inflow.axes == BODY and len(free.tau):
-            free, more = steered(free, merging.turning, inflow.sensors[0])
+            sigma = np.radians(options.sigma_heading_deg)
+            free, more = steered(free, merging.turning, sigma, inflow.sensors[0])
             problems += more
         elif inflow.axes and len(free.tau):
             free, more = escorted(free, inflow.axes, told, inflow.sensors[0])

@@ -66,7 +66,7 @@ class CleanOptions:
         Where antennas are, by name of a sensor or of an input: forward, starboard and up from the
         reference point, m. Positions are those of the reference point then. It takes headings.
     sigma_heading_deg
-        Standard deviation of the heading that carries lever arms, deg.
+        Standard deviation of the heading that carries lever arms and turns velocities, deg.
     process
         Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
     every_s

@@ -125,7 +125,9 @@ def _observed(
     )
 
 
-def steered(rows: Rows, turning: Turning, sensor: str) -> tuple[Rows, tuple[Problem, ...]]:
+def steered(
+    rows: Rows, turning: Turning, sigma_heading: float, sensor: str
+) -> tuple[Rows, tuple[Problem, ...]]:
     """Velocities along the vehicle's axes turned to east, north, up; without heading left out.
 
     Parameters
@@ -134,6 +136,8 @@ def steered(rows: Rows, turning: Turning, sensor: str) -> tuple[Rows, tuple[Prob
         Velocities to starboard, ahead and up, m/s.
     turning
         The headings of the vehicle.
+    sigma_heading
+        Their standard deviation, rad, which is added to what the sensor declares.
     sensor
         What measured them.
     """
@@ -141,12 +145,16 @@ def steered(rows: Rows, turning: Turning, sensor: str) -> tuple[Rows, tuple[Prob
     azimuth = azimuth_at(turning, fixes.time)
     velocity = fixes.velocity.copy()
     velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], -azimuth)
+    sigma = fixes.sigma_velocity.copy()
+    across = np.nan_to_num(np.abs(velocity[:, 1::-1])) * sigma_heading
+    sigma[:, :2] = np.hypot(sigma[:, :2], across)
     lost = np.isnan(azimuth) & np.isfinite(fixes.velocity[:, :2]).all(axis=1)
     problems: tuple[Problem, ...] = ()
     if lost.any():
         example = f"{sensor} at {fixes.time[lost][0]:.1f} s"
         problems = (Problem("no-heading", int(lost.sum()), example, _REMEDY),)
-    return rows._replace(fixes=fixes._replace(velocity=velocity)), problems
+    turned = fixes._replace(velocity=velocity, sigma_velocity=sigma)
+    return rows._replace(fixes=turned), problems
 
 
 def no_heading(source: str) -> OptionsError:
