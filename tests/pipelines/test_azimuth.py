@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from surefix.pipelines.turning import Turning, azimuth_at, settled
+from surefix.pipelines.azimuth import Headings, azimuth_at, settled
 
 
 def course(time):
@@ -14,7 +14,7 @@ def course(time):
 def known(time, wild=()):
     heading = course(time) % (2.0 * np.pi)
     heading[list(wild)] = (heading[list(wild)] + 1.5) % (2.0 * np.pi)
-    return Turning(np.asarray(time, dtype=float), heading)
+    return Headings(np.asarray(time, dtype=float), heading)
 
 
 def off(turning, time):
@@ -43,7 +43,7 @@ def test_a_gap_is_bridged_for_two_seconds_or_where_both_ends_are_near():
     assert lost.tolist() == [True, False, False, True, True, False, False, True]
     near = known(np.concatenate([np.arange(0.0, 20.0, 0.2), np.arange(29.7, 50.0, 0.2)]))
     assert np.isfinite(azimuth_at(near, np.arange(20.0, 29.0))).all()
-    assert np.isnan(azimuth_at(Turning(), np.array([1.0]))).all()
+    assert np.isnan(azimuth_at(Headings(), np.array([1.0]))).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -53,6 +53,6 @@ def test_what_is_settled_stays(seed):
     time = np.cumsum(rng.choice([0.1, 0.3, 1.0, 12.0], 200, p=[0.5, 0.3, 0.15, 0.05]))
     whole = known(time)
     for n in (17, 60, 150):
-        part = Turning(time[:n], whole.heading[:n])
+        part = Headings(time[:n], whole.heading[:n])
         times = np.linspace(time[0], settled(part), 50)
         np.testing.assert_array_equal(azimuth_at(part, times), azimuth_at(whole, times))

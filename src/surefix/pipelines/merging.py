@@ -14,6 +14,7 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.geo.angle import wrap
+from surefix.pipelines.azimuth import Headings, headed, settled
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.placing import Told, escorted, follow, known_until
 from surefix.pipelines.rows import (
@@ -25,7 +26,7 @@ from surefix.pipelines.rows import (
     take_rows,
 )
 from surefix.pipelines.supporting import BODY, NOT_CLEANED, no_heading, steered, support
-from surefix.pipelines.turning import Arm, Turning, arms_at, reached, settled, turned
+from surefix.pipelines.turning import Arm, Turning, arms_at, reached, turned
 from surefix.types import PLACE, Channel, Event, Fixes, FloatArray, Log, Problem
 
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
@@ -91,7 +92,9 @@ class Merging(NamedTuple):
     arms
         Where the antenna of each sensor is.
     turning
-        The headings, where an antenna has a lever arm or velocities are along the vehicle's axes.
+        The headings, where an antenna has a lever arm.
+    headings
+        Those that turn velocities along the vehicle's own axes.
     """
 
     inflows: tuple[_Inflow, ...]
@@ -101,6 +104,7 @@ class Merging(NamedTuple):
     released: float = -np.inf
     arms: tuple[Arm, ...] = ()
     turning: Turning = Turning()
+    headings: Headings = Headings()
 
     @property
     def ended(self) -> bool:
@@ -189,10 +193,17 @@ def _heeded(
 ) -> tuple[_Inflow, Merging]:
     """Take what a log tells of headings, and of the ship."""
     roles = {each.role for each in merging.inflows}
-    if options.lever_arm or ("velocity" in roles and roles & {*_HEADINGS}):
+    before = inflow.last_tau
+    if options.lever_arm:
         inflow, merging = _turn(inflow, merging, log)
     elif inflow.role in _HEADINGS:
         inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
+    if inflow.role in _HEADINGS and "velocity" in roles:
+        merging = merging._replace(
+            headings=headed(merging.headings, log.channels, merging.released)
+        )
+        sure = max(before, min(inflow.last_tau, settled(headings)))
+        inflow = inflow._replace(last_tau=sure)
     if inflow.role == "ship" or (log.axes and "ship" in roles):
         newest = max((each.last_tau for each in merging.inflows), default=-np.inf)
         needed = merging.released
@@ -239,8 +250,7 @@ def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging
         return inflow, merging
     turning = turned(merging.turning, log.channels, merging.released)
     if inflow.role in _HEADINGS:
-        until = min(reached(turning), settled(turning))
-        inflow = inflow._replace(last_tau=max(inflow.last_tau, until))
+        inflow = inflow._replace(last_tau=max(inflow.last_tau, reached(turning)))
     return inflow, merging._replace(turning=turning)
 
 
@@ -323,7 +333,7 @@ def _release(
         free = take_rows(rows, ~stay)
         if inflow.axes == BODY and len(free.tau):
             sigma = np.radians(options.sigma_heading_deg)
-            free, more = steered(free, merging.turning, sigma, inflow.sensors[0])
+            free, more = steered(free, merging.headings, sigma, inflow.sensors[0])
             problems += more
         elif inflow.axes and len(free.tau):
             free, more = escorted(free, inflow.axes, told, inflow.sensors[0])

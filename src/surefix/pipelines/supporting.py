@@ -14,8 +14,8 @@ import numpy as np
 
 from surefix.errors import OptionsError
 from surefix.geo.local_frame import rotate
+from surefix.pipelines.azimuth import Headings, azimuth_at
 from surefix.pipelines.rows import Rows, take_fixes
-from surefix.pipelines.turning import Turning, azimuth_at
 from surefix.types import Channel, Fixes, FloatArray, IntArray, Log, Problem
 
 __all__ = ["BODY", "NOT_CLEANED", "Support", "no_heading", "steered", "support"]
@@ -126,7 +126,7 @@ def _observed(
 
 
 def steered(
-    rows: Rows, turning: Turning, sigma_heading: float, sensor: str
+    rows: Rows, headings: Headings, sigma_heading: float, sensor: str
 ) -> tuple[Rows, tuple[Problem, ...]]:
     """Velocities along the vehicle's axes turned to east, north, up; without heading left out.
 
@@ -134,15 +134,15 @@ def steered(
     ----------
     rows
         Velocities to starboard, ahead and up, m/s.
-    turning
-        The headings of the vehicle.
+    headings
+        Those of the vehicle.
     sigma_heading
         Their standard deviation, rad, which is added to what the sensor declares.
     sensor
         What measured them.
     """
     fixes = rows.fixes
-    azimuth = azimuth_at(turning, fixes.time)
+    azimuth = azimuth_at(headings, fixes.time)
     velocity = fixes.velocity.copy()
     velocity[:, 0], velocity[:, 1] = rotate(velocity[:, 0], velocity[:, 1], -azimuth)
     sigma = fixes.sigma_velocity.copy()

@@ -1,10 +1,9 @@
-"""What the heading of a vehicle turns: its lever arms, and the velocities along its own axes.
+"""Where antennas are on a vehicle that turns: lever arms, carried by its heading.
 
 An antenna that is mounted away from the reference point describes a circle when the vehicle turns.
 With the heading at the time of a fix its offset is known, to the uncertainty of the heading times
-its distance; without one it is not, and the distance itself is the uncertainty. A velocity along
-the axes of the vehicle says where it goes only with the heading. The vehicle is taken to be level:
-its roll and pitch are noise to a fix or a velocity, and are estimated as such.
+its distance; without one it is not, and the distance itself is the uncertainty. The vehicle is
+taken to be level: its roll and pitch are noise to a fix, and are estimated as such.
 """
 
 from __future__ import annotations
@@ -16,19 +15,16 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from surefix.geo.angle import wrap
-from surefix.types import BoolArray, Channel, FloatArray, IntArray
+from surefix.types import BoolArray, Channel, FloatArray
 
-__all__ = ["Arm", "Turning", "arms_at", "azimuth_at", "reached", "settled", "turned"]
+__all__ = ["Arm", "Turning", "arms_at", "reached", "turned"]
 
 Arm = tuple[float, ...]
 """Forward, starboard and up, m, from the reference point to the antenna; empty: there is none."""
 
 _KEPT: Final = 120.0  # s of headings that are kept
 _AWAY: Final = 2.0  # s between a heading and a fix that are too many
-_BESIDE: Final = 10.0  # s between two headings that still turn a velocity between them
 _DRIFT: Final = math.radians(1.0)  # rad/s that a heading may change unseen
-_MEDIAN: Final = 1.0  # s before and after, over which the heading that turns a velocity is typical
-_INSTANTS: Final = 11  # at which it is looked at there
 _SPAN: Final = 0.5  # s before and after, over which the rate of turn is taken
 
 
@@ -100,70 +96,6 @@ def arms_at(
     lever[unknown, :2] = lever[unknown, 3:5] = 0.0
     lever[unknown, 6:8] = np.hypot(forward, starboard)[unknown, None]
     return lever
-
-
-def azimuth_at(turning: Turning, time: FloatArray) -> FloatArray:
-    """Headings at given times, rad: between two at most 10 s apart, or up to 2 s after the last.
-
-    Each is the median of those within a second, so that less than a second of wrong ones does
-    nothing; near a gap and at the ends of as many as there are on either side.
-
-    Parameters
-    ----------
-    turning
-        The headings there are.
-    time
-        (n,) s.
-
-    Returns
-    -------
-    heading
-        (n,) clockwise from north; NaN where it is not known.
-    """
-    known = turning.time
-    if len(known) < 2:
-        return np.full(len(time), np.nan)
-    at = np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)
-    after = np.minimum(at + 1, len(known) - 1)
-    gap, past = known[after] - known[at], time - known[at]
-    heading, following = _typical(turning, at), _typical(turning, after)
-    between = (gap > 0.0) & (gap <= _BESIDE)
-    share = np.where(between, past / np.where(between, gap, 1.0), 0.0)
-    begins, _ = _stretch(known, at)
-    earlier = np.maximum(np.searchsorted(known, known[at] - _SPAN, side="right") - 1, begins)
-    swept, lasted = _wrapped(heading - _typical(turning, earlier)), known[at] - known[earlier]
-    rate = np.where(lasted > 0.0, swept / np.where(lasted > 0.0, lasted, 1.0), 0.0)
-    moved = np.where(between, share * _wrapped(following - heading), rate * past)
-    there = (past >= 0.0) & (between | (past <= _AWAY))
-    return np.where(there, heading + moved, np.nan)
-
-
-def settled(turning: Turning) -> float:
-    """Time up to which another heading changes nothing that `azimuth_at` says, s."""
-    known = turning.time
-    sure = known[known <= known[-1] - _MEDIAN] if len(known) else known
-    return float(sure[-1]) if len(sure) else -math.inf
-
-
-def _stretch(known: FloatArray, index: IntArray) -> tuple[IntArray, IntArray]:
-    """First and last heading of the stretch without a gap that some headings lie in."""
-    cuts = np.flatnonzero(np.diff(known) > _BESIDE) + 1
-    bounds = np.concatenate([[0], cuts, [len(known)]])
-    stretch = np.searchsorted(bounds, index, side="right") - 1
-    return bounds[stretch], bounds[stretch + 1] - 1
-
-
-def _typical(turning: Turning, index: IntArray) -> FloatArray:
-    """Median of the headings within a second of some of them, at as many instants on each side."""
-    known, own = turning.time, turning.heading[index]
-    first, last = _stretch(known, index)
-    here = known[index]
-    wide = np.minimum(_MEDIAN, np.minimum(here - known[first], known[last] - here))
-    instants = here[:, None] + wide[:, None] * np.linspace(-1.0, 1.0, _INSTANTS)
-    right = np.clip(np.searchsorted(known, instants), first[:, None], last[:, None])
-    left = np.maximum(right - 1, first[:, None])
-    nearest = np.where(instants - known[left] <= known[right] - instants, left, right)
-    return own + np.median(_wrapped(turning.heading[nearest] - own[:, None]), axis=1)
 
 
 def _heading_at(turning: Turning, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
