@@ -199,9 +199,8 @@ def _heeded(
     elif inflow.role in _HEADINGS:
         inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     if inflow.role in _HEADINGS and "velocity" in roles:
-        merging = merging._replace(
-            headings=headed(merging.headings, log.channels, merging.released)
-        )
+        headings = headed(merging.headings, log.channels, merging.released)
+        merging = merging._replace(headings=headings)
         sure = max(before, min(inflow.last_tau, settled(headings)))
         inflow = inflow._replace(last_tau=sure)
     if inflow.role == "ship" or (log.axes and "ship" in roles):
