@@ -28,6 +28,7 @@ def clean(
     velocity: Data | None = None,
     heading: Data | None = None,
     attitude: Data | None = None,
+    ship: Sequence[Data] = (),
     columns: Mapping[str, str] | None = None,
     target: str | None = None,
     edits: str | Path | None = None,
@@ -44,6 +45,9 @@ def clean(
         modified.
     depth, velocity, heading, attitude
         Other sensors, each of the same kinds, with their own clocks and rates.
+    ship
+        Logs with position and heading of the ship that an acoustic positioning system is on, where
+        they are not in its own log; the one to be preferred first.
     columns
         What columns mean where their names do not say it: ``{"time": "lcm_timestamp:us"}``.
     target
@@ -72,6 +76,7 @@ def clean(
         velocity=velocity,
         heading=heading,
         attitude=attitude,
+        ship=ship,
         columns=columns,
         target=target,
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -24,10 +23,13 @@ from surefix.cli_inputs import (
     Depth,
     Heading,
     NoChecksum,
+    Ship,
     Target,
     Velocity,
     chosen_options,
+    delays,
     keep_inputs,
+    seconds,
 )
 from surefix.cli_live import live
 from surefix.cli_locate import locate
@@ -35,7 +37,7 @@ from surefix.cli_progress import over_bytes, over_runs
 from surefix.cli_review import review
 from surefix.cli_signals import obeyed
 from surefix.cli_warmup import announced, warmup
-from surefix.errors import OptionsError, SurefixError
+from surefix.errors import SurefixError
 
 __all__ = ["app", "clean", "demo", "info", "main", "reproduce"]
 
@@ -48,7 +50,6 @@ app = typer.Typer(
 )
 
 _INTERRUPTED = 130
-_SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Inputs = Annotated[
     list[str],
@@ -164,6 +165,7 @@ def clean(
     velocity: Velocity = None,
     heading: Heading = None,
     attitude: Attitude = None,
+    ship: Ship = None,
     column: Columns = None,
     options: Annotated[
         Path | None, typer.Option(help="TOML file with options; the command line wins.")
@@ -194,26 +196,28 @@ def clean(
             "model": model,
             "k0": k0,
             "k1": k1,
-            "lag_s": _seconds("--lag", lag),
-            "recovery_s": _seconds("--recovery", recovery),
+            "lag_s": seconds("--lag", lag),
+            "recovery_s": seconds("--recovery", recovery),
             "sigma_position": sigma_position,
             "sigma_height": sigma_height,
             "sigma_velocity": sigma_velocity,
             "process": process,
-            "every_s": _seconds("--every", every),
+            "every_s": seconds("--every", every),
             "latency": latency,
             "drags": drags or None,
         },
-        _delays(sensor_delay or []),
+        delays(sensor_delay or []),
     )
     check_report(report)
     beside = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
-    files = [Path(path) for path in (*inputs, *beside.values(), options, edits) if path is not None]
+    given = (*inputs, *beside.values(), *(ship or []), options, edits)
+    files = [Path(path) for path in given if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
     with announced(), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
             **beside,
+            ship=ship or (),
             columns={**columns, **mapping(column or [])},
             require_checksum=not no_checksum,
             target=target,
@@ -239,6 +243,7 @@ def info(
     velocity: Velocity = None,
     heading: Heading = None,
     attitude: Attitude = None,
+    ship: Ship = None,
     column: Columns = None,
     no_checksum: NoChecksum = False,
     target: Target = None,
@@ -249,11 +254,13 @@ def info(
     from surefix.pipelines.info import describe, info_lines
 
     beside = {"depth": depth, "velocity": velocity, "heading": heading, "attitude": attitude}
-    files = [Path(path) for path in (*inputs, *beside.values()) if path is not None]
+    given = (*inputs, *beside.values(), *(ship or []))
+    files = [Path(path) for path in given if path is not None]
     with announced(), over_bytes(files, quiet=as_json) as told:
         found = describe(
             inputs,
             **beside,
+            ship=ship or (),
             columns=mapping(column or []),
             require_checksum=not no_checksum,
             target=target,
@@ -365,31 +372,6 @@ def _use_utf8() -> None:
         reconfigure: Callable[..., None] | None = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(encoding="utf-8", errors="replace")
-
-
-def _delays(words: list[str]) -> dict[str, float]:
-    """Read NAME=DURATION."""
-    out = {}
-    for word in words:
-        name, equals, duration = word.rpartition("=")
-        seconds = _seconds("--sensor-delay", duration) if equals else None
-        if not name or seconds is None:
-            raise OptionsError(f"--sensor-delay {word!r}", "NAME=DURATION, such as usbl=1.3s")
-        out[name] = seconds
-    return out
-
-
-def _seconds(option: str, text: str | None) -> float | None:
-    """Read a duration such as 0.5s, 200ms or 2min."""
-    if text is None:
-        return None
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ms|s|min|h|)\s*", text)
-    try:
-        if match is not None:
-            return float(match[1]) * _SECONDS[match[2]]
-    except ValueError:
-        pass
-    raise OptionsError(f"{option} {text!r}", "a duration such as 0.5s, 200ms or 2min")
 
 
 def _print(found: dict[str, Any], text: list[str], as_json: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,11 +18,16 @@ __all__ = [
     "Depth",
     "Heading",
     "NoChecksum",
+    "Ship",
     "Target",
     "Velocity",
     "chosen_options",
+    "delays",
     "keep_inputs",
+    "seconds",
 ]
+
+_SECONDS = {"ms": 1e-3, "": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Columns = Annotated[
     list[str] | None,
@@ -40,6 +46,13 @@ Heading = Annotated[
 ]
 Attitude = Annotated[
     Path | None, typer.Option(help="Log of roll and pitch; they carry lever arms.")
+]
+Ship = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Log with position or heading of the ship that an acoustic system is on, where they "
+        "are not in its own; repeatable, the best first."
+    ),
 ]
 NoChecksum = Annotated[
     bool, typer.Option("--no-checksum", help="Accept NMEA sentences without a checksum.")
@@ -85,3 +98,40 @@ def chosen_options(
     if delays:
         words["sensor_delay_s"] = {**stored.clean.get("sensor_delay_s", {}), **delays}
     return options_from({**stored.clean, **words}), stored.columns
+
+
+def delays(words: list[str]) -> dict[str, float]:
+    """Read texts NAME=DURATION; s by name.
+
+    Raises
+    ------
+    OptionsError
+        One of them is none.
+    """
+    out = {}
+    for word in words:
+        name, equals, duration = word.rpartition("=")
+        late = seconds("--sensor-delay", duration) if equals else None
+        if not name or late is None:
+            raise OptionsError(f"--sensor-delay {word!r}", "NAME=DURATION, such as usbl=1.3s")
+        out[name] = late
+    return out
+
+
+def seconds(option: str, text: str | None) -> float | None:
+    """Read the duration, such as 0.5s, 200ms or 2min, that was given to an option; s.
+
+    Raises
+    ------
+    OptionsError
+        It is none.
+    """
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ms|s|min|h|)\s*", text)
+    try:
+        if match is not None:
+            return float(match[1]) * _SECONDS[match[2]]
+    except ValueError:
+        pass
+    raise OptionsError(f"{option} {text!r}", "a duration such as 0.5s, 200ms or 2min")

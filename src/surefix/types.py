@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "AXES",
+    "PLACE",
     "BoolArray",
     "ByteArray",
     "Channel",
@@ -42,6 +43,8 @@ BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
 AXES = ("x", "y", "z")
+PLACE = ("latitude_deg", "longitude_deg")
+"""Series that tell where a ship was from which something is seen."""
 
 
 class Verdict(IntEnum):
@@ -184,6 +187,10 @@ class Log:
     """Records met by kind (sentence type, row); for `surefix info`."""
     depth_positive_down: bool = False
     """True where the third axis was given as a depth (height = −depth)."""
+    axes: str = ""
+    """Of positions that are yet to be placed by where the ship was: ``ship`` (x to starboard, y
+    ahead), ``north`` (x east, y north of it). ``?``: not known yet; ``wait``: nor is it known of
+    positions that wait for that."""
 
 
 class Reason(IntEnum):

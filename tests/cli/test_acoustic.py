@@ -96,7 +96,9 @@ def test_a_dvl_beside_the_transponder(dive, tmp_path):
     np.testing.assert_allclose(rows["vx"], east, atol=0.005)
     np.testing.assert_allclose(rows["vy"], north, atol=0.005)
     noise = {(n["sensor"], n["quantity"]): (n["value"], n["source"]) for n in told["noise"]}
-    assert noise["auv DVL", "velocity"] == (pytest.approx(0.004), "declared")
+    # and that of the heading, 1°, across: mean of both axes
+    turned = [math.hypot(0.004, math.radians(1.0) * speed) for speed in (east, north)]
+    assert noise["auv DVL", "velocity"] == (pytest.approx(np.mean(turned), rel=0.01), "declared")
     assert not [name for name in told["outputs"] if "velocity_sigma" in name]
 
 

@@ -47,16 +47,21 @@ class Mission:
     def __init__(self, folder, url="sqlite:///mission.db", epochs=40_000, speed=100.0):
         self.place = folder / "live.toml"
         (folder / "boat.nmea").write_bytes(recorded(epochs))
-        self.log = (folder / "boat.nmea").read_bytes()
+        self.begin(LIVE, url, speed)
+
+    def begin(self, text, url, speed):
+        """Write the options, and read the logs that they name."""
         self.client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         self.client.bind(("127.0.0.1", 0))
         self.client.setblocking(False)
         port = self.client.getsockname()[1]
-        self.place.write_text(LIVE.format(port=port, url=url, speed=speed))
+        self.place.write_text(text.format(port=port, url=url, speed=speed))
         self.options = read_live(self.place)
+        self.logs = [Path(each.address.path).read_bytes() for each in self.options.inputs]
+        self.sizes = [0] * len(self.logs)
         self.reference = begin_station(self.options)
-        self.taken = self.size = self.said = 0
+        self.taken = self.said = 0
         self.heard = []
         self.kills = Counter()
         self.first_outputs = []
@@ -77,8 +82,9 @@ class Mission:
         pieces = list(live.journal.received(self.taken))
         assert [p.number for p in pieces] == list(range(self.taken + 1, live.taken + 1))
         for piece in pieces:
-            assert self.log[self.size : self.size + len(piece.data)] == piece.data
-            self.size += len(piece.data)
+            before = self.sizes[piece.source]
+            self.sizes[piece.source] += len(piece.data)
+            assert self.logs[piece.source][before : before + len(piece.data)] == piece.data
             self.reference, _ = receive(self.reference, [piece])
         self.taken = live.taken
         assert stored(live.station) == stored(self.reference)
@@ -98,7 +104,7 @@ class Mission:
         self.place.write_text(re.sub(r"speed=[\d.]+", "speed=0", text))
         subprocess.run([*PROGRAM, self.place], check=True, stdout=subprocess.DEVNULL)
         self.check()
-        assert self.size == len(self.log)
+        assert self.sizes == [len(log) for log in self.logs]
         self.client.close()
 
 

@@ -51,6 +51,8 @@ class Plan(NamedTuple):
         Rank in `surefix.io.acoustic_ship.HEADINGS` of the headings that turn positions.
     others
         Other targets in the log.
+    apart
+        Whether another log tells where the ship was; what is in its axes is then placed by that.
     """
 
     target: str
@@ -58,8 +60,10 @@ class Plan(NamedTuple):
     source: str
     heading: int
     others: tuple[str, ...]
+    apart: bool = False
 
 
+_APART = "on the Earth, from the ship's position and heading in a log of their own"
 _AXES: dict[Place, str] = {
     "globe": "on the Earth, relative ones from the ship's position and heading at their time",
     "grid": "x and y are easting and northing on a grid whose zone the log does not tell",
@@ -71,7 +75,8 @@ _AXES: dict[Place, str] = {
 def described(plan: Plan) -> str:
     """Say in one sentence whose fixes these are, and in which axes."""
     others = f"; also seen: {', '.join(plan.others)} (--target)" if plan.others else ""
-    return f"fixes of {plan.target}, {_AXES[plan.place]}{others}"
+    apart = plan.apart and plan.place in ("ship", "north")
+    return f"fixes of {plan.target}, {_APART if apart else _AXES[plan.place]}{others}"
 
 
 def is_acoustic(path: Path) -> bool:
@@ -101,7 +106,9 @@ def _suspect(block: bytes) -> bool:
     return any(bool((pair == _DOLLAR_P).any()) for pair in pairs)
 
 
-def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan | None:
+def plan_of(
+    path: Path, *, require_checksum: bool, target: str | None, apart: bool = False
+) -> Plan | None:
     """Look an acoustic log through; None if its fixes are the ship's own.
 
     Without a target it is the one that is seen most often, a ship only where nothing else is;
@@ -115,6 +122,8 @@ def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan |
         As in reading it.
     target
         Whose fixes are wanted, or None.
+    apart
+        Whether another log tells where the ship was.
 
     Raises
     ------
@@ -135,7 +144,7 @@ def plan_of(path: Path, *, require_checksum: bool, target: str | None) -> Plan |
         raise OptionsError(
             f"target {target!r} for {path}", f"one of {known}" if known else "no target"
         )
-    return seen.plan(target)
+    return seen.plan(target, apart=apart)
 
 
 def _look(seen: Seen, frames: list[Frame], require_checksum: bool) -> None:
@@ -193,7 +202,7 @@ class Seen:
         """Targets, the one that is seen most often first."""
         return sorted(self.targets, key=lambda name: -self._worth(name))
 
-    def plan(self, target: str | None) -> Plan | None:
+    def plan(self, target: str | None, *, apart: bool = False) -> Plan | None:
         """How the sightings of a target, None: of the likeliest, become fixes; None: the ship's."""
         names = self.ranked()
         below = [name for name in names if not name.lower().startswith(SHIP)] or names
@@ -201,11 +210,11 @@ class Seen:
         if chosen not in names:
             return None
         found = sorted(self.sources.items(), key=lambda item: -item[1])
-        ship = next((name for name, total in found if total), "")
-        heading = min(self.headings, default=_NO_RANK)
+        ship = next((name for name, total in found if total and not apart), "")
+        heading = _NO_RANK if apart else min(self.headings, default=_NO_RANK)
         place = _place(self.targets[chosen], bool(ship), heading < _NO_RANK)
         others = tuple(name for name in names if name != chosen)
-        return Plan(chosen, place, ship, heading, others)
+        return Plan(chosen, place, ship, heading, others, apart)
 
     def _worth(self, name: str) -> float:
         """Valid sightings of a target; one that was filtered counts as half a measured one."""

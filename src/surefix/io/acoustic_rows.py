@@ -34,13 +34,16 @@ class Sightings:
     ----------
     plan
         From looking the log through; of a stream, a transponder, or `FIRST`.
+    apart
+        Whether another log tells where the ship was; sightings are then left in its axes.
     """
 
-    def __init__(self, plan: Plan | str) -> None:
+    def __init__(self, plan: Plan | str, apart: bool = False) -> None:
         self.sources: list[str] = []
         self.lost: list[float] = []  # times of sightings that could not be placed
         self.plan = None if isinstance(plan, str) else plan
         self._target = plan if isinstance(plan, str) else plan.target
+        self._apart = apart
         self._seen = Seen()
         self._ships: dict[str, Ship] = {}  # by source of the positions, those without plan
         self._turns: dict[int, Ship] = {}  # by rank of the headings, those without plan
@@ -53,6 +56,14 @@ class Sightings:
     def __len__(self) -> int:
         """Rows that are ready."""
         return len(self._valid)
+
+    @property
+    def axes(self) -> str:
+        """What the rows are in, as ``Log.axes``."""
+        if self.plan is None:
+            return "wait" if self._waiting else "?"
+        left = self._apart and self.plan.place in ("ship", "north")
+        return self.plan.place if left else ""
 
     @property
     def count(self) -> int:
@@ -122,11 +133,11 @@ class Sightings:
         if heard < _HEARD or heard >= _PATIENCE:
             return heard >= _PATIENCE
         plan = self._seen.plan(self._target)
-        return plan is not None and plan.place in ("globe", "grid")
+        return self._apart or (plan is not None and plan.place in ("globe", "grid"))
 
     def _settle(self) -> None:
         """Make the plan, and keep of the ship what it needs."""
-        plan = self._seen.plan(self._target)
+        plan = self._seen.plan(self._target, apart=self._apart)
         if plan is not None:
             self.plan = plan
             self._ship = self._ships.get(plan.source, Ship())
@@ -196,7 +207,7 @@ class Sightings:
 
     def _place(self, record: Sighting, time: float) -> None:
         assert self.plan is not None
-        found = placed(record, time, self._ship, self.plan.place)
+        found = placed(record.x, record.y, record.place, time, self._ship, self.plan.place)
         if found is None:
             self.lost.append(time)
             where = (math.nan, math.nan, math.nan)

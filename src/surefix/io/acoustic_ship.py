@@ -15,7 +15,6 @@ from typing import NamedTuple, TypeVar
 
 from surefix.geo.angle import wrap
 from surefix.geo.local_frame import LocalFrame
-from surefix.io.acoustic_record import Sighting
 from surefix.io.nmea_record import Position
 
 __all__ = ["GAP", "HEADINGS", "Placed", "Ship", "placed"]
@@ -120,13 +119,13 @@ def _around(known: deque[_Entry], time: float) -> tuple[_Entry, _Entry] | None:
     return before, after
 
 
-def placed(sighting: Sighting, time: float, ship: Ship, place: str) -> Placed | None:
+def placed(x: float, y: float, axes: str, time: float, ship: Ship, place: str) -> Placed | None:
     """Bring a sighting to the axes of the output; None if they cannot be reached from its own.
 
     Parameters
     ----------
-    sighting
-        What was seen.
+    x, y, axes
+        What was seen, as in `surefix.io.acoustic_record.Sighting`; ``axes`` is its ``place``.
     time
         s, when.
     ship
@@ -134,14 +133,13 @@ def placed(sighting: Sighting, time: float, ship: Ship, place: str) -> Placed | 
     place
         What the output is in, one of `surefix.io.acoustic_record.Place`.
     """
-    if math.isnan(sighting.x):
+    if math.isnan(x):
         return Placed(math.nan, math.nan)
-    x, y = sighting.x, sighting.y
-    if sighting.place == place:
+    if axes == place:
         return Placed(x, y)
-    if sighting.place not in ("ship", "north") or place not in ("north", "globe"):
+    if axes not in ("ship", "north") or place not in ("north", "globe"):
         return None
-    if sighting.place == "ship":
+    if axes == "ship":
         angle = math.radians(ship.heading(time))
         sine, cosine = math.sin(angle), math.cos(angle)
         x, y = x * cosine + y * sine, y * cosine - x * sine

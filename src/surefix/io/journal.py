@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from sqlalchemy import Column, Double, LargeBinary, SmallInteger, Table, Text, func, select
@@ -18,8 +17,8 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import Connection
 
 from surefix.errors import InputError, OptionsError
+from surefix.io.feeds import again, feeds, streams, task_of
 from surefix.io.journal_place import NUMBER, TABLES, Place, open_place
-from surefix.io.nmea_stream import NmeaStream
 from surefix.types import Log
 
 __all__ = ["Journal", "Received", "Told", "journal_logs", "open_journal"]
@@ -256,7 +255,7 @@ def journal_logs(
 ) -> list[tuple[str, str, Iterator[Log]]]:
     """Open the inputs of a journal for reading: name and role of each, and its parts.
 
-    The role in the journal may name an acoustic target: ``fixes of B01``.
+    An input that has several tasks is there several times.
 
     Raises
     ------
@@ -265,21 +264,20 @@ def journal_logs(
     """
     journal = open_journal(url, new=False)
 
-    def parts(number: int, name: str, target: str | None) -> Iterator[Log]:
-        stream = NmeaStream(Path(name), require_checksum, target)
-        for piece in journal.received(source=number):
-            if piece.data:
-                yield stream.read(piece.data, piece.time)
-        yield stream.rest()
-
     sources = journal.sources()
     if not sources:
         raise InputError(f"{url}: a data base without inputs", "a journal of surefix live")
-    tasks = [(name, *task.partition(" of ")) for name, task in sources]
-    return [
-        (name, role, parts(i, name, target or None))
-        for i, (name, role, _, target) in enumerate(tasks)
-    ]
+    names, tasks = [name for name, _ in sources], [task_of(task) for _, task in sources]
+
+    def parts(number: int, first: bool) -> Iterator[Log]:
+        stream = streams(names, tasks, [require_checksum] * len(names))[number]
+        for piece in journal.received(source=number):
+            if piece.data:
+                log = stream.read(piece.data, piece.time)
+                yield log if first else again(log)
+        yield stream.rest() if first else again(stream.rest())
+
+    return [(names[i], role, parts(i, k < len(names))) for k, (i, role) in enumerate(feeds(tasks))]
 
 
 def _row(record: Received | Told) -> dict[str, object]:

@@ -57,6 +57,7 @@ def read_nmea(
     *,
     require_checksum: bool = True,
     target: str | None = None,
+    apart: bool = False,
     chunk_fixes: int = 50_000,
     progress: Callable[[int], None] | None = None,
 ) -> Iterator[Log]:
@@ -77,6 +78,8 @@ def read_nmea(
         False accepts sentences without a checksum. A wrong one is never accepted.
     target
         Which transponder, or ``ship``; default the one that is seen most often.
+    apart
+        Whether sightings are placed later, as in `surefix.io.nmea_stream.NmeaStream`.
     chunk_fixes
         Rows of fixes per chunk, about.
     progress
@@ -89,8 +92,8 @@ def read_nmea(
     OptionsError
         If the log has no such target.
     """
-    plan = _plan(path, require_checksum, target)
-    reader = NmeaStream(path, require_checksum, plan)
+    plan = _plan(path, require_checksum, target, apart)
+    reader = NmeaStream(path, require_checksum, plan, apart)
     state, done, given = START, 0, 0
     step = min(max(chunk_fixes, 1), _STEP)
     try:
@@ -114,10 +117,10 @@ def read_nmea(
         yield rest
 
 
-def _plan(path: Path, require_checksum: bool, target: str | None) -> Plan | None:
+def _plan(path: Path, require_checksum: bool, target: str | None, apart: bool) -> Plan | None:
     try:
         if target is None and not is_acoustic(path):
             return None
-        return plan_of(path, require_checksum=require_checksum, target=target)
+        return plan_of(path, require_checksum=require_checksum, target=target, apart=apart)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", "a readable file") from error

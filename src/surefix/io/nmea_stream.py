@@ -15,7 +15,7 @@ from surefix.io.acoustic_record import Attitude, BodyVelocity, Sighting
 from surefix.io.acoustic_rows import Sightings
 from surefix.io.nmea import parse
 from surefix.io.nmea_clock import LogClock, receive_time
-from surefix.io.nmea_epoch import Epochs
+from surefix.io.nmea_epoch import Epochs, source
 from surefix.io.nmea_frame import START, Frame, finish, foreign, frame
 from surefix.io.nmea_lines import Plain
 from surefix.io.nmea_record import (
@@ -33,7 +33,7 @@ from surefix.io.nmea_record import (
     WaterSpeed,
 )
 from surefix.io.nmea_series import Series
-from surefix.types import Event, Log, Problem
+from surefix.types import PLACE, Event, Log, Problem
 
 __all__ = ["NmeaStream"]
 
@@ -57,17 +57,24 @@ class NmeaStream:
     plan
         Which acoustic target's sightings are its fixes, and how; of a stream, which is not looked
         through before, the target alone, or `FIRST`. None: the fixes are those of its receivers.
+    apart
+        Whether sightings, of this log or another, are placed later, by what is told of the ship
+        here or elsewhere: its positions are given as series, and sightings left in its axes.
     """
 
     def __init__(
-        self, path: Path, require_checksum: bool = True, plan: Plan | str | None = None
+        self,
+        path: Path,
+        require_checksum: bool = True,
+        plan: Plan | str | None = None,
+        apart: bool = False,
     ) -> None:
-        self._path = path
+        self._path, self._apart = path, apart
         self._framing = START
         self._arrival = math.nan
         self._require_checksum = require_checksum
         self._clock = LogClock()
-        self._epochs = Epochs() if plan is None or plan == SHIP else Sightings(plan)
+        self._epochs = Epochs() if plan is None or plan == SHIP else Sightings(plan, apart)
         self._led = math.nan  # time that a device has given to the log
         self._devices = {name: DeviceClock() for name in ("DVL", "USBLLONG")}
         self._channels = Series()
@@ -107,7 +114,7 @@ class NmeaStream:
 
     def copy(self) -> NmeaStream:
         """One that goes on by itself from here, between two pieces."""
-        other = NmeaStream(self._path, self._require_checksum)
+        other = NmeaStream(self._path, self._require_checksum, apart=self._apart)
         other.resume(
             self.state
             | {
@@ -256,6 +263,7 @@ class NmeaStream:
             events=tuple(self._events()),
             counts=self._counts,
             depth_positive_down=self._sightings is not None,
+            axes=self._sightings.axes if self._sightings is not None else "",
         )
         self._channels, self._problems, self._counts = Series(), {}, {}
         self._clock.settle()
@@ -313,6 +321,10 @@ class NmeaStream:
     def _position(self, record: Position) -> None:
         time = self._instant(record.second, record.day)
         self._epochs.add(record, time, self._clock.receive)
+        if self._apart and record.valid:
+            name = f"{source(record.talker)} {record.type}"
+            self._channels.add(PLACE[0], name, time, record.latitude)
+            self._channels.add(PLACE[1], name, time, record.longitude)
         if record.type == "RMC":
             sensor = record.talker + "RMC"
             self._channels.add("speed_mps", sensor, time, record.speed)

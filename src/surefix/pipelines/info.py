@@ -29,6 +29,7 @@ def describe(
     velocity: str | Path | None = None,
     heading: str | Path | None = None,
     attitude: str | Path | None = None,
+    ship: Sequence[str | Path] = (),
     columns: Mapping[str, str] | None = None,
     require_checksum: bool = True,
     target: str | None = None,
@@ -38,7 +39,7 @@ def describe(
 
     Parameters
     ----------
-    inputs, depth, velocity, heading, attitude, columns, require_checksum, target, progress
+    inputs, depth, velocity, heading, attitude, ship, columns, require_checksum, target, progress
         As `surefix.pipelines.inputs.open_inputs`.
     """
     counts: dict[str, dict[str, int]] = {}
@@ -48,6 +49,7 @@ def describe(
         velocity=velocity,
         heading=heading,
         attitude=attitude,
+        ship=ship,
         columns=columns,
         require_checksum=require_checksum,
         target=target,
@@ -71,13 +73,14 @@ def describe(
         "problems": found["problems"],
         "command": _command(
             inputs,
-            {
-                "--depth": depth,
-                "--velocity": velocity,
-                "--heading": heading,
-                "--attitude": attitude,
-                "--target": target,
-            },
+            [
+                ("--depth", depth),
+                ("--velocity", velocity),
+                ("--heading", heading),
+                ("--attitude", attitude),
+                *(("--ship", path) for path in ship),
+                ("--target", target),
+            ],
             columns,
             require_checksum,
         ),
@@ -144,14 +147,14 @@ def _rounded(value: float) -> float | None:
 
 def _command(
     inputs: Sequence[str | Path],
-    others: Mapping[str, str | Path | None],
+    others: Sequence[tuple[str, str | Path | None]],
     columns: Mapping[str, str] | None,
     require_checksum: bool,
 ) -> str:
     """The `clean` command that fits these inputs."""
     stem = Path(inputs[0]).stem
     words = ["surefix", "clean", *(str(path) for path in inputs)]
-    for option, path in others.items():
+    for option, path in others:
         words += [option, str(path)] if path is not None else []
     for role, column in (columns or {}).items():
         words += ["--column", f"{role}={column}"]

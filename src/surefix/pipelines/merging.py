@@ -14,7 +14,9 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.geo.angle import wrap
+from surefix.pipelines.azimuth import Headings, headed, settled
 from surefix.pipelines.options import CleanOptions
+from surefix.pipelines.placing import Told, escorted, follow, known_until
 from surefix.pipelines.rows import (
     METRES_PER_DEGREE,
     Rows,
@@ -23,14 +25,18 @@ from surefix.pipelines.rows import (
     take_fixes,
     take_rows,
 )
+from surefix.pipelines.supporting import BODY, NOT_CLEANED, no_heading, steered, support
 from surefix.pipelines.turning import ANGLES, Arm, Turning, arms_at, reached, turned
-from surefix.types import Channel, Event, Fixes, FloatArray, Log, Problem
+from surefix.types import PLACE, Channel, Event, Fixes, FloatArray, Log, Problem
 
 __all__ = ["Chunk", "Merging", "begin_merging", "merge"]
 
-_ATTITUDE = ("heading", "attitude")  # roles of inputs that tell how the vehicle lies, nothing else
-_WITH_CHANNELS = ("fixes", *_ATTITUDE)  # roles whose scalar series are cleaned beside the track
-_NO_SERIES = "velocity_sigma_mps"  # what a sensor declares of its velocities is not one
+_HEADINGS = ("heading", "turning")  # roles whose headings are those of the vehicle
+_ATTITUDE = (*_HEADINGS, "attitude")  # roles of inputs that tell how it lies, nothing else
+_WITH_CHANNELS = ("fixes", "heading", "attitude", "ship")  # whose series are cleaned as well
+_WAITS = 300.0  # s that sightings of a live stream may wait for what they are in
+_NO_VELOCITY = "a table with velocities, or a log of a DVL; a receiver is an input of fixes"
+_NO_SERIES = (NOT_CLEANED, *PLACE)  # what only goes with another series is not one
 
 
 class Chunk(NamedTuple):
@@ -46,7 +52,9 @@ class Chunk(NamedTuple):
 class _Inflow(NamedTuple):
     """Where one input stands: its sensors and clock, rows held back by it, and rows in order.
 
-    In its rows a sensor has its number in ``sensors`` here.
+    In its rows a sensor has its number in ``sensors`` here. ``axes`` says in which axes they are
+    until they are let go: as ``Log.axes``, or the vehicle's own; ``waits`` that there are some of
+    which that is not known yet; ``ship`` is what it tells of the ship.
     """
 
     name: str
@@ -58,6 +66,14 @@ class _Inflow(NamedTuple):
     last_tau: float = -np.inf
     longitude: float = np.nan
     ended: bool = False
+    waits: bool = False
+    axes: str = ""
+    ship: tuple[Told, ...] = ()
+
+    @property
+    def reach(self) -> float:
+        """Time up to which it brings nothing new, s, but for rows that are late."""
+        return min(self.last_tau, known_until(self.ship) if self.ship else np.inf)
 
 
 class Merging(NamedTuple):
@@ -79,6 +95,8 @@ class Merging(NamedTuple):
     turnings
         Heading, roll and pitch, where an antenna has a lever arm: of the inputs of these roles, and
         those beside the fixes.
+    headings
+        Those that turn velocities along the vehicle's own axes.
     """
 
     inflows: tuple[_Inflow, ...]
@@ -88,6 +106,7 @@ class Merging(NamedTuple):
     released: float = -np.inf
     arms: tuple[Arm, ...] = ()
     turnings: tuple[Turning, Turning] = (Turning(), Turning())
+    headings: Headings = Headings()
 
     @property
     def ended(self) -> bool:
@@ -104,12 +123,14 @@ class Merging(NamedTuple):
 def begin_merging(inputs: Sequence[tuple[str, str]], patience: float = np.inf) -> Merging:
     """Begin to merge inputs of the given names and roles.
 
-    A role is ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes; or
-    ``heading`` or ``attitude``, series that are only cleaned, and carry the lever arms. The heading
-    is that of an input of the first, else of the second, else that beside the fixes; roll and pitch
-    are those of the second, else of the first, else those beside the fixes. An input that is more
-    than ``patience`` seconds behind is waited for no longer; what it brings from before the rows
-    that were let go is late.
+    A role is ``fixes``; ``depth`` or ``velocity``, whose observations support the fixes;
+    ``heading`` or ``attitude``, series that are only cleaned, and carry lever arms and turn
+    velocities; ``turning``, the same as ``heading`` where it is cleaned by another role already; or
+    ``ship``, positions and headings of the ship from which the fixes are seen. The heading is that
+    of an input of the first, else of the second, else, for lever arms, that beside the fixes; roll
+    and pitch are those of the second, else of the first, else those beside the fixes. An input that
+    is more than ``patience`` seconds behind is waited for no longer; what it brings from before the
+    rows that were let go is late.
     """
     return Merging(tuple(_Inflow(name, role) for name, role in inputs), patience=patience)
 
@@ -131,20 +152,23 @@ def merge(
         How far out of order a row may be, and how much too late the times of a sensor are.
     """
     inflow = merging.inflows[source]._replace(ended=log is None)
-    fixes = _supporting(log, inflow.role) if log is not None else None
-    if fixes is not None and log is not None:
-        delay = options.sensor_delay_s
-        names = log.sensors if inflow.role != "depth" else _depth_sensors(log)
+    if log is not None and inflow.role == "fixes":
+        inflow = inflow._replace(waits=log.axes == "wait")
+    brought = support(log, inflow.role) if log is not None else None
+    fixes = None if brought is None else brought.fixes
+    if fixes is not None and brought is not None:
+        delay, names = options.sensor_delay_s, brought.sensors
         inflow = inflow._replace(sensors=tuple(dict.fromkeys((*inflow.sensors, *names))))
+        inflow = inflow._replace(axes=brought.axes or inflow.axes)
         numbers = np.array([inflow.sensors.index(name) for name in names] or [0])
         delays = np.array([delay.get(name, 0.0) for name in names] or [0.0])
         time = fixes.time - delays[fixes.sensor]
         fixes = fixes._replace(sensor=numbers[fixes.sensor], time=time)
+    if inflow.axes == BODY and not {each.role for each in merging.inflows} & {*_ATTITUDE}:
+        raise no_heading(inflow.name)
     inflow, events = _order(inflow, fixes, options.reorder_s)
-    if log is not None and options.lever_arm:
-        inflow, merging = _turn(inflow, merging, log)
-    elif log is not None and inflow.role in _ATTITUDE:
-        inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
+    if log is not None:
+        inflow, merging = _heeded(inflow, merging, log, options)
     inflows = [*merging.inflows]
     inflows[source] = inflow
     least = max((each.last_tau for each in inflows if not each.ended), default=np.inf)
@@ -153,18 +177,46 @@ def merge(
         if each.held is not None and not each.ended and each.last_tau < least < np.inf:
             inflows[i], more = _order(each, None, options.reorder_s, least)
             events = (*events, *more)
-    inflows, rows, released = _release(inflows, merging, least)
+    inflows, rows, released, problems = _release(inflows, merging, least, options)
     after = merging._replace(inflows=tuple(inflows), released=released)
     if rows is not None:
         after, rows = _numbered(after, rows, options)
         if options.lever_arm:
             rows = _with_arms(rows, after, options)
     if log is None:
-        return after, Chunk(rows, (), events, (), False)
-    channels = tuple(each for each in log.channels if each.name != _NO_SERIES)
+        if inflow.role == "velocity" and not inflow.sensors:
+            problems = (*problems, Problem("no-velocity", 1, inflow.name, _NO_VELOCITY))
+        return after, Chunk(rows, (), events, problems, False)
+    channels = tuple(each for each in log.channels if each.name not in _NO_SERIES)
     channels = channels if inflow.role in _WITH_CHANNELS else ()
-    events = (*log.events, *events)
-    return after, Chunk(rows, channels, events, log.problems, log.depth_positive_down)
+    events, problems = (*log.events, *events), (*log.problems, *problems)
+    return after, Chunk(rows, channels, events, problems, log.depth_positive_down)
+
+
+def _heeded(
+    inflow: _Inflow, merging: Merging, log: Log, options: CleanOptions
+) -> tuple[_Inflow, Merging]:
+    """Take what a log tells of headings, and of the ship."""
+    roles = {each.role for each in merging.inflows}
+    before = inflow.last_tau
+    if options.lever_arm:
+        inflow, merging = _turn(inflow, merging, log)
+    elif inflow.role in _ATTITUDE:
+        inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
+    if inflow.role in ({*_HEADINGS} & roles or {"attitude"}) and "velocity" in roles:
+        headings = headed(merging.headings, log.channels, merging.released)
+        merging = merging._replace(headings=headings)
+        sure = max(before, min(inflow.last_tau, settled(headings)))
+        inflow = inflow._replace(last_tau=sure)
+    if inflow.role == "ship" or (log.axes and "ship" in roles):
+        newest = max((each.last_tau for each in merging.inflows), default=-np.inf)
+        needed = merging.released
+        if merging.patience < np.inf:
+            needed = max(needed, newest - _WAITS)
+        inflow = inflow._replace(ship=follow(inflow.ship, log, needed))
+    if inflow.role == "ship":
+        inflow = inflow._replace(last_tau=known_until(inflow.ship))
+    return inflow, merging
 
 
 def _numbered(merging: Merging, rows: Rows, options: CleanOptions) -> tuple[Merging, Rows]:
@@ -189,26 +241,6 @@ def _reached(log: Log, before: float) -> float:
     return max((float(np.nanmax(c.time, initial=before)) for c in log.channels), default=before)
 
 
-def _supporting(log: Log, role: str) -> Fixes | None:
-    """The fixes of a log; a depth series becomes observations of the height alone."""
-    if role != "depth":
-        return None if role in _ATTITUDE else log.fixes
-    series = _depths(log)
-    if not series:
-        return None
-    time = np.concatenate([c.time for c in series])
-    number = {name: k for k, name in enumerate(_depth_sensors(log))}
-    sensor = np.concatenate([np.full(len(c.time), number[c.sensor]) for c in series])
-    n = len(time)
-    position = np.full((n, 3), np.nan)
-    position[:, 2] = -np.concatenate([c.value for c in series])
-    empty = np.full((n, 3), np.nan)
-    zero = np.zeros(n, np.int64)
-    return Fixes(
-        time, position, empty, empty, empty, sensor, zero, np.ones(n, bool), np.arange(n), False
-    )
-
-
 def _arm(name: str, home: str, options: CleanOptions) -> Arm:
     """Where the antenna of a sensor is: named by sensor, or by input."""
     given = options.lever_arm
@@ -218,9 +250,9 @@ def _arm(name: str, home: str, options: CleanOptions) -> Arm:
 def _turn(inflow: _Inflow, merging: Merging, log: Log) -> tuple[_Inflow, Merging]:
     """Take the angles of an input for its lever arms, but for those that another one is for."""
     roles = {each.role for each in merging.inflows}
-    left = {"heading": roles & {"heading"}, "roll": roles & {"attitude"}}
+    left = {"heading": roles & {*_HEADINGS}, "roll": roles & {"attitude"}}
     left["pitch"] = left["roll"]
-    names = [name for name in ANGLES if left[name] <= {inflow.role}]
+    names = [name for name in ANGLES if not left[name] or inflow.role in left[name]]
     own, beside = merging.turnings
     if inflow.role in _ATTITUDE:
         own = turned(own, log.channels, merging.released, names)
@@ -237,14 +269,6 @@ def _with_arms(rows: Rows, merging: Merging, options: CleanOptions) -> Rows:
     sigmas = np.radians([options.sigma_heading_deg, options.sigma_attitude_deg])
     own, time = arms[rows.fixes.sensor], rows.fixes.time
     return rows._replace(lever=arms_at(merging.turnings, time, own, *sigmas.tolist()))
-
-
-def _depths(log: Log) -> list[Channel]:
-    return [channel for channel in log.channels if channel.name == "depth_m"]
-
-
-def _depth_sensors(log: Log) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(channel.sensor for channel in _depths(log)))
 
 
 def _order(
@@ -288,17 +312,21 @@ def _place(inflow: _Inflow, fixes: Fixes | None) -> tuple[_Inflow, FloatArray]:
 
 
 def _release(
-    inflows: list[_Inflow], merging: Merging, least: float
-) -> tuple[list[_Inflow], Rows | None, float]:
+    inflows: list[_Inflow], merging: Merging, least: float, options: CleanOptions
+) -> tuple[list[_Inflow], Rows | None, float, tuple[Problem, ...]]:
     """Merge the ready rows that no input can still precede; also tells up to when.
 
     An input that is behind ``least`` is not waited for. The sensors of all inputs are numbered
-    through.
+    through. What is in axes of its own is turned, or put on the Earth, and counted where it cannot.
     """
-    waits = (max(inflow.last_tau, least) for inflow in inflows if not inflow.ended)
+    waits = (
+        max(inflow.reach, least - _WAITS * inflow.waits) for inflow in inflows if not inflow.ended
+    )
     until = min(waits, default=np.inf)
     out: list[Rows] = []
     keys: list[FloatArray] = []
+    problems: list[Problem] = []
+    told = [each.ship for role in ("ship", "fixes") for each in inflows if each.role == role]
     after: list[_Inflow] = []
     before = 0
     for inflow in inflows:
@@ -311,18 +339,25 @@ def _release(
         stay = (key >= until) & (len(inflows) > 1) & (until < np.inf)
         after.append(inflow._replace(ready=(take_rows(rows, stay),) if stay.any() else ()))
         free = take_rows(rows, ~stay)
+        if inflow.axes == BODY and len(free.tau):
+            sigma = np.radians(options.sigma_heading_deg)
+            free, more = steered(free, merging.headings, sigma, inflow.sensors[0])
+            problems += more
+        elif inflow.axes and len(free.tau):
+            free, more = escorted(free, inflow.axes, told, inflow.sensors[0])
+            problems += more
         out.append(free._replace(fixes=free.fixes._replace(sensor=free.fixes.sensor + own)))
         keys.append(key[~stay])
     released = max([merging.released, *(float(key[-1]) for key in keys if len(key))])
     if not sum(len(rows.tau) for rows in out):
-        return after, None, released
+        return after, None, released, tuple(problems)
     together = join_rows(out)
     if len(out) > 1:
         together = take_rows(together, np.argsort(np.concatenate(keys), kind="stable"))
     if merging.patience < np.inf:
         late = together.late | (together.tau < merging.released)
         together = together._replace(late=late)
-    return after, together, released
+    return after, together, released, tuple(problems)
 
 
 def _carried(tau: FloatArray) -> FloatArray:

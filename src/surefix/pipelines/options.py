@@ -66,7 +66,8 @@ class CleanOptions:
         Where antennas are, by name of a sensor or of an input: forward, starboard and up from the
         reference point, m. Positions are those of the reference point then. It takes headings.
     sigma_heading_deg, sigma_attitude_deg
-        Standard deviation of the heading that carries lever arms, and of roll and pitch, deg.
+        Standard deviation of the heading that carries lever arms and turns velocities, and of the
+        roll and pitch that carry lever arms, deg.
     process
         Root of the process noise density: m/s^1.5 (cv) or m/s^2.5 (ca).
     every_s

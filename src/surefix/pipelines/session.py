@@ -151,7 +151,7 @@ def _batches(
         text = f"{session.held} fixes were held, the same position polled again; each counted once"
         empty = nothing(session.sensors, session.options, session.setup)
         told = (Event("held", np.nan, text),)
-        batches.append(replace(empty, sources=session.names, events=told))
+        batches.append(replace(empty, sources=session.sources, events=told))
     return session, tuple(batches)
 
 
@@ -169,7 +169,7 @@ def _batch(
     session, channels = _clean_channels(session, chunks, final=final, begins=begins)
     return session, replace(
         cleaned,
-        sources=session.names,
+        sources=session.sources,
         has_depth=has_depth,
         channels=channels,
         events=(*events, *cleaned.events),

@@ -87,6 +87,12 @@ class Session:
     held: int = 0
 
     @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the inputs; what is read again for its headings is one."""
+        pairs = zip(self.names, self.merging.inflows, strict=True)
+        return tuple(name for name, inflow in pairs if inflow.role != "turning")
+
+    @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the sensors met so far."""
         return self.merging.sensors

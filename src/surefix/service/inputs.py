@@ -25,6 +25,7 @@ _CLIENTS: Final = 100  # of one server; more are turned away
 _BLOCK: Final = 1 << 16
 _AGAIN: Final = (0.2, 5.0)  # s between attempts to connect: at first, and at most
 _CLOCK: Final = re.compile(rb"\$..(?:GGA|RMC|GNS|ZDA|GLL,[^*]*?),(\d{2})(\d{2})(\d{2}(?:\.\d+)?)")
+_MESSAGE: Final = re.compile(rb"\$|\{|\+\+\+AT")  # what the time of reception stands before
 _STEP: Final = 0.02  # s: a replay sends what is due so often
 _LONGEST: Final = 5.0  # s: longer gaps of a log are not waited for
 _DAY: Final = 86_400.0
@@ -272,8 +273,8 @@ async def _replay(source: int, line: Line, inbox: Inbox) -> None:
 
 def _recorded(text: bytes, latest: float) -> float:
     """Time of a line of a log, s: of its reception, or of the day; NaN if it has none."""
-    start = text.find(b"$")
-    if start > 0 and not math.isnan(at := receive_time(text[:start])):
+    message = _MESSAGE.search(text)
+    if message and not math.isnan(at := receive_time(text[: message.start()])):
         return at
     found = _CLOCK.search(text)
     if found is None:

@@ -119,7 +119,7 @@ def judge_sensors(
     there = {each.source for each in heard}
     for source, (name, role) in enumerate(inputs):
         if source not in there:
-            quantity = "position" if role == "fixes" else role
+            quantity = "position" if role in ("fixes", "ship") else role
             silent = SensorState(name, name, quantity, "invalid", "silent: nothing came yet")
             after.append(_since(silent, old.get((name, name)), now, newest))
     return tuple(after)

@@ -132,7 +132,7 @@ def begin_live(options: LiveOptions) -> Live:
         The journal cannot be opened, or is of other inputs.
     """
     journal = open_journal(options.journal)
-    journal.begin([(each.name, each.task) for each in options.inputs])
+    journal.begin([(each.name, str(each.task)) for each in options.inputs])
     station = begin_station(options)
     for _, snapshot in journal.snapshots():
         try:

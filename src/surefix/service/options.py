@@ -39,6 +39,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from surefix.errors import OptionsError
+from surefix.io.feeds import ROLES, Feed, Task, feeds
 from surefix.io.options_file import read_options
 from surefix.io.toml_file import read_toml
 from surefix.io.write_nmea import TYPES
@@ -51,7 +52,6 @@ __all__ = ["SENTENCES", "AlarmOptions", "InputOptions", "LiveOptions", "OutputOp
 SENTENCES: Final = (*TYPES, "GBS")
 """What can be put out; gpsd takes its expected errors from GBS."""
 
-_ROLES: Final = ("fixes", "depth", "heading", "attitude")
 _INPUT: Final = {
     "name", "from", "role", "allow", "require_checksum", "target", "lever_arm",
 }  # fmt: skip
@@ -69,7 +69,10 @@ class InputOptions:
     address
         Where it is read from.
     role
-        ``fixes``, ``depth`` (supports the fixes), ``heading`` or ``attitude`` (carry lever arms).
+        What it is for, one or several of `surefix.io.feeds.ROLES`: ``fixes``; ``depth`` and
+        ``velocity``, which support them; ``heading``, of the vehicle, which turns velocities and
+        lever arms; ``attitude``, its roll and pitch, which carry lever arms; ``ship``, position and
+        heading of the ship that the fixes are seen from.
     allow
         Networks that datagrams and clients may come from; empty: any.
     require_checksum
@@ -81,7 +84,7 @@ class InputOptions:
 
     name: str
     address: Address
-    role: str = "fixes"
+    role: str | tuple[str, ...] = "fixes"
     allow: tuple[str, ...] = ()
     require_checksum: bool = True
     target: str | None = None
@@ -89,8 +92,7 @@ class InputOptions:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise OptionsError(f"input name {self.name!r}", "a name")
-        if self.role not in _ROLES:
-            raise OptionsError(f"role {self.role!r} of {self.name}", "one of " + ", ".join(_ROLES))
+        self._check_roles()
         for network in _texts("allow", self.allow):
             try:
                 ipaddress.ip_network(network, strict=False)
@@ -100,13 +102,32 @@ class InputOptions:
             raise OptionsError(f"require_checksum {self.require_checksum!r}", "true or false")
         if self.target is not None and (not isinstance(self.target, str) or not self.target):
             raise OptionsError(f"target {self.target!r}", "the name of a transponder, or first")
-        if self.target is not None and self.role != "fixes":
+        if self.target is not None and "fixes" not in self.roles:
             raise OptionsError(f"target of {self.name}, a source of {self.role}", "role fixes")
 
+    def _check_roles(self) -> None:
+        given = self.role if isinstance(self.role, tuple) else (self.role,)
+        if not given or len(set(given)) < len(given) or not set(given) <= {*ROLES}:
+            raise OptionsError(
+                f"role {self.role!r} of {self.name}", "one or several of " + ", ".join(ROLES)
+            )
+        if "ship" in given and {"fixes", "heading"} & set(given):
+            raise OptionsError(
+                f"role {self.role!r} of {self.name}, the ship's and the vehicle's at a time",
+                "ship, or fixes and heading",
+                "position and heading of the ship in the line of the target need no role",
+            )
+
     @property
-    def task(self) -> str:
-        """Its role and target, as the journal has them."""
-        return self.role if self.target is None else f"{self.role} of {self.target}"
+    def roles(self) -> tuple[str, ...]:
+        """What it is for, in the order of `surefix.io.feeds.ROLES`."""
+        given = self.role if isinstance(self.role, tuple) else (self.role,)
+        return tuple(role for role in ROLES if role in given)
+
+    @property
+    def task(self) -> Task:
+        """Its roles and target."""
+        return Task(self.roles, self.target)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,13 +209,26 @@ class LiveOptions:
     web: WebOptions | None = None
 
     def __post_init__(self) -> None:
-        if not any(each.role == "fixes" for each in self.inputs):
+        roles = {role for each in self.inputs for role in each.roles}
+        if "fixes" not in roles:
             raise OptionsError("no input of fixes", "[[input]] with name and from")
+        if "velocity" in roles and not roles & {"heading", "attitude"}:
+            raise OptionsError(
+                "velocities along the vehicle's own axes, and no heading",
+                "an input with the role heading: that of the vehicle",
+            )
+        if "ship" in roles and not any(each.target for each in self.inputs):
+            raise OptionsError("an input of the ship, and no target", "an input with a target")
         names = [each.name for each in self.inputs]
         if len(set(names)) < len(names):
             raise OptionsError(f"inputs {', '.join(names)}", "names that differ")
         if not isinstance(self.snapshot_s, int | float) or not self.snapshot_s > 0.0:
             raise OptionsError(f"snapshot_s = {self.snapshot_s!r}", "seconds above 0")
+
+    @property
+    def feeds(self) -> tuple[Feed, ...]:
+        """What goes to the cleaning: one series for each input, then those of further roles."""
+        return feeds([each.task for each in self.inputs])
 
 
 def read_live(path: str | Path) -> LiveOptions:

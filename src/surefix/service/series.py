@@ -61,7 +61,8 @@ def series_at(
             else:
                 values.pop((series.sensor, series.name), None)
     told = dict.fromkeys(_ROLES, math.nan)
-    stems = [(f"{Path(name).stem} ", role) for name, role in zip(names, roles, strict=True)]
+    own = ("heading" if role == "turning" else role for role in roles)
+    stems = [(f"{Path(name).stem} ", role) for name, role in zip(names, own, strict=True)]
     for name, ranked in _ROLES.items():
         told[name] = _first(
             (value, [role for stem, role in stems if sensor.startswith(stem)], ranked)

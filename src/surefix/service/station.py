@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from surefix.io.feeds import Feed, again
+from surefix.io.feeds import streams as opened
 from surefix.io.journal import Received
 from surefix.io.nmea_stream import NmeaStream
 from surefix.pipelines.session import advance, begin_session, end_on_trial
@@ -110,6 +111,8 @@ class Station:
         When something came of each sensor.
     rows
         How many rows are cleaned for good.
+    feeds
+        What of the inputs goes into the session.
     """
 
     session: Session
@@ -118,16 +121,18 @@ class Station:
     shown: Latest | None = None
     heard: tuple[Heard, ...] = ()
     rows: int = 0
+    feeds: tuple[Feed, ...] = ()
 
 
 def begin_station(options: LiveOptions) -> Station:
     """Begin with nothing received."""
-    inputs = [(each.name, each.role) for each in options.inputs]
-    streams = tuple(
-        NmeaStream(Path(each.name), each.require_checksum, each.target) for each in options.inputs
-    )
+    given, parts = options.inputs, options.feeds
+    inputs = [(given[source].name, role) for source, role in parts]
+    checked = [each.require_checksum for each in given]
+    streams = opened([each.name for each in given], [each.task for each in given], checked)
     patient = any(each.address.kind == "file" for each in options.inputs)  # a log comes to its end
-    return Station(begin_session(inputs, options.clean, live=not patient), streams)
+    session = begin_session(inputs, options.clean, live=not patient)
+    return Station(session, streams, feeds=parts)
 
 
 class _Stored(NamedTuple):
@@ -157,10 +162,10 @@ def resumed(options: LiveOptions, content: bytes) -> Station:
         It is damaged, or of another version.
     """
     known = restored(content, _Stored)
-    streams = begin_station(options).streams
-    for stream, state in zip(streams, known.streams, strict=True):
+    new = begin_station(options)
+    for stream, state in zip(new.streams, known.streams, strict=True):
         stream.resume(state)
-    return Station(known.session, streams, *known[2:])
+    return Station(known.session, new.streams, *known[2:], new.feeds)
 
 
 def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tuple[Cleaned, ...]]:
@@ -183,29 +188,38 @@ def receive(station: Station, received: Sequence[Received]) -> tuple[Station, tu
         stream = streams[piece.source]
         log = stream.read(piece.data, piece.time) if piece.data else stream.rest()
         heard = hear(heard, piece.source, log, [*stream.begun, *stream.waiting], piece.time)
-        session, done = advance(session, piece.source, log)
-        batches += done
+        session = _take(session, station.feeds, piece.source, log, batches)
         behind = max((each.latest for each in heard), default=-math.inf) - session.merging.patience
         for i, other in enumerate(streams):
             begun = other.begun
             if i != piece.source and begun and begun[0][2] < behind:
                 streams[i] = other.copy()
-                session, done = advance(session, i, streams[i].settle(behind))
-                batches += done
+                session = _take(session, station.feeds, i, streams[i].settle(behind), batches)
         if not piece.data:
-            session, done = advance(session, piece.source, None)
-            batches += done
+            session = _take(session, station.feeds, piece.source, None, batches)
     after = received[-1].number if received else station.after
     shown = _last(batches, station.shown)
     rows = station.rows + sum(len(batch.track.time) for batch in batches)
-    return Station(session, tuple(streams), after, shown, heard, rows), tuple(batches)
+    known = Station(session, tuple(streams), after, shown, heard, rows, station.feeds)
+    return known, tuple(batches)
+
+
+def _take(
+    session: Session, feeds: Sequence[Feed], source: int, log: Log | None, batches: list[Cleaned]
+) -> Session:
+    """Take in the next part of an input, for each of its tasks; None: it has come to its end."""
+    for number, feed in enumerate(feeds):
+        if feed.source == source:
+            part = log if log is None or number == source else again(log)
+            session, done = advance(session, number, part)
+            batches += done
+    return session
 
 
 def fixes_begun(station: Station) -> int:
     """How many fixes were begun to be read, of all inputs: more of them make a newer position."""
-    inflows = station.session.merging.inflows
-    pairs = zip(station.streams, inflows, strict=True)
-    return sum(stream.count for stream, inflow in pairs if inflow.role == "fixes")
+    sources = [feed.source for feed in station.feeds if feed.role == "fixes"]
+    return sum(station.streams[source].count for source in sources)
 
 
 def latest(station: Station, time: float = math.nan) -> Latest | None:
@@ -227,7 +241,8 @@ def look_ahead(station: Station, time: float = math.nan) -> Ahead:
     if station.session.setup is None:
         return Ahead(station.session, None)
     logs = [stream.copy().rest() for stream in station.streams]
-    roles = [inflow.role for inflow in station.session.merging.inflows]
+    roles = [feed.role for feed in station.feeds]
+    logs += [again(logs[feed.source]) for feed in station.feeds[len(logs) :]]
     first = roles.index("fixes")
     logs[first] = _with(logs[first], time)
     session, batches = end_on_trial(with_few_series(station.session), logs)
@@ -243,11 +258,10 @@ def look_ahead(station: Station, time: float = math.nan) -> Ahead:
 
 def _dives(station: Station, time: float) -> bool:
     """Whether the height of the track is that of a depth sensor which is still heard."""
-    inflows = station.session.merging.inflows
     heard = [
-        stream.newest
-        for stream, inflow in zip(station.streams, inflows, strict=True)
-        if inflow.role == "depth" or (station.session.has_depth and inflow.role == "fixes")
+        station.streams[source].newest
+        for source, role in station.feeds
+        if role == "depth" or (station.session.has_depth and role == "fixes")
     ]
     return any(time - newest <= FRESH for newest in heard)
 
@@ -271,9 +285,10 @@ def _with(log: Log, time: float) -> Log:
 
 
 def _observed(batches: Sequence[Cleaned], before: float) -> float:
-    """Time of the last fix that was used."""
+    """Time of the last fix that was used; of a sighting that has no place the depth may be."""
     for batch in batches:
         used = np.isin(batch.verdicts.verdict, (Verdict.USED, Verdict.DOWNWEIGHTED))
+        used &= np.isfinite(batch.raw_position[:, :2]).any(axis=1)
         before = float(np.fmax.reduce(batch.track.time[used], initial=before))
     return before
 

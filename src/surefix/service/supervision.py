@@ -38,7 +38,7 @@ def remember(live: Live, now: float) -> None:
 def judge(live: Live, now: float) -> None:
     """Judge the sensors by what is known now, and raise or clear the alarms that follow."""
     session = live.station.session if live.ahead is None else live.ahead.session
-    inputs = [(each.name, each.role) for each in live.options.inputs]
+    inputs = [(each.name, each.roles[0]) for each in live.options.inputs]
     at = math.nan if live.recorded else now
     live.sensors = judge_sensors(live.sensors, live.station.heard, session, inputs, at)
     live.noted, fresh = news(live.noted, live.sensors, _moment(live, now))
