@@ -144,8 +144,7 @@ def learn(
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
         residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
         supposed_before, before = prior, figures
-        own = (part[:, :axes] for part in (residual, variance, epochs.variance))
-        prior = counted(prior, said, *own)
+        prior = counted(prior, said, residual, variance, epochs.variance)
         figures = _likeliest(sample, said, prior, given, before, least, motion)
         if noisy is None:
             noisy = np.sqrt(np.maximum(figures.velocity**2 - floor[1] ** 2, 0.0))

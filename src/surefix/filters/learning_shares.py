@@ -19,6 +19,7 @@ _SHARES = {
     "poor": (0.5, 50.0),
     "manoeuvre": (0.02, 100.0),
     "row": (1.0, 3.0),
+    "velocity": (2.0, 100.0),
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _LEAST_WILD = 5.0  # scale of gross errors at least, in standard deviations
@@ -34,7 +35,7 @@ def counted(
     variance: FloatArray,
     noise: FloatArray,
 ) -> Prior:
-    """Shares and sizes of the gross errors among the positions that were decided.
+    """Shares and sizes of the gross errors among what was decided.
 
     Parameters
     ----------
@@ -43,17 +44,31 @@ def counted(
     said
         The decisions about n epochs.
     residual, variance
-        (n, axes) deleted residuals of the positions, and their variances; NaN where not observed.
+        (n, 2·axes) deleted residuals, and their variances; NaN where not observed.
     noise
-        (n, axes) variances of the positions themselves.
+        (n, 2·axes) variances of the observations themselves.
     """
-    axes = residual.shape[1]
+    axes = residual.shape[1] // 2
+    moving = np.isfinite(residual[:, axes:]).any(axis=1)
+    residual, variance, noise = (part[:, :axes] for part in (residual, variance, noise))
     seen = np.isfinite(residual)
     if not seen.any():
         return prior
+    slips = (said.fixed[moving, axes:] == 0.0).all(axis=1)
+    prior = prior._replace(velocity=_share("velocity", _begin(slips), len(slips)))
     told = _with_shares(prior, said, residual, math.sqrt(float(np.median(noise[seen]))))
     whole = seen.any(axis=1) & ~((said.fixed[:, :axes] > 0.0) & seen).any(axis=1)
     return _with_small(told, whole & (said.run == 0), residual, variance, noise)
+
+
+def _share(name: str, count: int, among: int) -> float:
+    wrong, every = _SHARES[name]
+    return float((count + wrong) / (among + every))
+
+
+def _begin(flags: BoolArray) -> int:
+    """How many stretches there are in which a flag is raised."""
+    return int((np.diff(flags.astype(np.int64), prepend=0) > 0).sum())
 
 
 def _with_shares(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) -> Prior:
@@ -70,21 +85,16 @@ def _with_shares(prior: Prior, said: Decisions, residual: FloatArray, sigma: flo
     placed = seen.any(axis=1)
     alone = whole[placed] & (said.run[placed] == 0)
     after = alone[:-2] & alone[1:-1]
-
-    def share(name: str, count: int, among: int | None = None) -> float:
-        wrong, everything = _SHARES[name]
-        return float((count + wrong) / ((total if among is None else among) + everything))
-
     spread = prior.spread.copy()
     if out.sum() >= _FEW:
         size = float(np.median(np.abs(residual[out])))
         spread[:axes] = max(size, _LEAST_WILD * sigma)
     return prior._replace(
-        isolated=share("isolated", alone.sum()),
-        partial=share("partial", some.sum()),
-        poor=share("poor", poor.sum()),
-        manoeuvre=share("manoeuvre", turns),
-        row=min(share("row", (after & alone[2:]).sum(), after.sum()), 1.0 - prior.ending),
+        isolated=_share("isolated", alone.sum(), total),
+        partial=_share("partial", some.sum(), total),
+        poor=_share("poor", poor.sum(), total),
+        manoeuvre=_share("manoeuvre", turns, total),
+        row=min(_share("row", (after & alone[2:]).sum(), after.sum()), 1.0 - prior.ending),
         spread=spread,
     )
 
