@@ -148,11 +148,10 @@ def learn(
         figures = _likeliest(sample, said, prior, given, before, least, motion)
         if noisy is None:
             noisy = np.sqrt(np.maximum(figures.velocity**2 - floor[1] ** 2, 0.0))
-        if np.isnan(given.velocity).any():
-            rounded = _rounded(observations, figures, noisy, floor[1], order)
-            least = least._replace(velocity=np.fmax(least.velocity, rounded))
-            higher = np.isnan(given.velocity) & (figures.velocity < least.velocity)
-            figures.velocity[higher] = least.velocity[higher]
+        rounded = _rounded(observations, figures, noisy, floor[1], order)
+        least = least._replace(velocity=np.fmax(least.velocity, rounded))
+        higher = np.where(np.isnan(given.velocity), least.velocity, 0.0)
+        figures = figures._replace(velocity=np.maximum(figures.velocity, higher))
         if _change(before, figures) < _ENOUGH and _moved(supposed_before, prior) < _ENOUGH:
             break
     return Learnt(figures, prior)
