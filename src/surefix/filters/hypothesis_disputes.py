@@ -107,7 +107,7 @@ def settle_fixes(
     placed = np.asarray(np.isfinite(epochs.z[:, :d]).any(axis=1) & (said.run == 0))
     used = (said.fixed[:, :d] > 0.0) & np.isfinite(epochs.z[:, :d])
     wrong = np.asarray(placed & ~used.any(axis=1))
-    free = np.isnan(epochs.fixed[:, :d]).all(axis=1)
+    free = np.asarray(np.isnan(epochs.fixed[:, :d]).all(axis=1))
     out = np.zeros(len(wrong), np.bool_)
     sensor = epochs.sensor if len(epochs.sensor) else np.zeros(len(out), np.int64)
     for own in np.unique(sensor[wrong]):
