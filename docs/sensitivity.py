@@ -51,6 +51,7 @@ CONSTANTS: Final[Mapping[str, str]] = MappingProxyType(
         "learning._DIFFER": "size",
         "learning._MANY": "probability",
         "learning._WILD": "size",
+        "learning_shares._ONE": "size",
     }
 )
 """What is changed, and how: fields of ``Prior``, and constants of modules of ``surefix.filters``.
@@ -168,7 +169,7 @@ def _apart(variant: Variant | None, plan: Plan, kernels: Path) -> dict[Cell, flo
 
 def _compiled(name: str) -> bool:
     """Whether kernels know the constant."""
-    return not name.startswith(("Prior.", "learning.")) and name != "hypotheses.MOST"
+    return not name.startswith(("Prior.", "learning")) and name != "hypotheses.MOST"
 
 
 def _once(learn: Callable[..., Any]) -> Callable[..., Any]:

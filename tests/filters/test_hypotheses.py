@@ -27,7 +27,7 @@ NAMES = {2: "cv", 3: "ca"}
 def prior_of(axes, **changes):
     """Every account has its chance."""
     made = Prior(0.2, 0.23, 0.15, 0.17, 0.19, 4.0, 0.05, 0.2, 0.7, np.repeat([8.0, 2.0], axes), 2.0)
-    return made._replace(**changes)
+    return made._replace(small=0.4)._replace(**changes)
 
 
 def series(

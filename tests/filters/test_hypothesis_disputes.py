@@ -1,11 +1,12 @@
-"""Rows of velocities that only one direction of the filter believes, judged together."""
+"""What vouches for each other, judged together: velocities, and fixes amid wrong ones."""
 
 import numpy as np
 import pytest
 
-from surefix.filters.hypothesis_disputes import settle_velocities
+from surefix.filters.hypothesis_disputes import settle_fixes, settle_velocities
+from surefix.filters.hypothesis_trail import undecided
 from surefix.filters.learning import supposed
-from surefix.filters.records import Epochs, Motion
+from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis
 
 N, SIGMA, NOISE, Q = 160, 1.0, 0.05, 0.06
@@ -77,3 +78,57 @@ def test_what_was_decided_beforehand_stays():
     epochs.fixed[ROWS, 1] = 1.0  # the user accepts them: both accounts are the same
     out = settle_velocities(motion, prior, epochs, flags(ROWS), flags())
     assert not out.any()
+
+
+AMID = slice(60, 90)  # of which all but two fixes are wild
+PAIR = np.array([74, 75])
+
+
+def amid(seed, axes, off, **supposes):
+    """Fixes alone, of which the pair is ``off`` (two of σ) along one way; which are taken out."""
+    rng = np.random.default_rng(seed)
+    motion, prior, epochs = made(seed, axes)
+    epochs.z[:, axes:] = np.nan
+    ways = rng.standard_normal((N, axes))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    wild = flags(AMID)
+    wild[PAIR] = False
+    epochs.z[wild, :axes] += rng.uniform(30.0, 100.0, (wild.sum(), 1)) * ways[wild]
+    epochs.z[PAIR, :axes] += np.array(off)[:, None] * ways[0]
+    said = undecided(motion, N)
+    said.fixed[wild, :axes] = 0.0
+    prior = prior._replace(**{"row": 0.9, **supposes})
+    out = settle_fixes(motion, prior, epochs, said, Recovery(np.inf, 20.0, keeps_rate=True))
+    return np.flatnonzero(out).tolist()
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_fixes_that_agree_amid_wrong_ones_may_be_wrong_together(axes):
+    """Each of them is where it should be if the other is."""
+    for seed in range(4):
+        assert amid(seed, axes, (11.0, 12.0)) == PAIR.tolist()
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_good_fixes_amid_wrong_ones_stay(axes):
+    for seed in range(4):
+        assert amid(seed, axes, (0.0, 0.0), isolated=0.3, row=0.5) == []
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_one_of_two_may_be_good(axes):
+    for seed in range(4):
+        often = {"isolated": 0.3, "row": 0.5}
+        assert amid(seed, axes, (0.0, 14.0), **often) == [75]
+        assert amid(seed, axes, (14.0, 0.0), **often) == [74]
+
+
+def test_fixes_that_the_user_accepts_are_not_judged_together():
+    motion, prior, epochs = made(0, 2)
+    epochs.z[PAIR, :2] += 12.0
+    epochs.fixed[PAIR] = 1.0
+    said = undecided(motion, N)
+    said.fixed[AMID, :2] = 0.0
+    said.fixed[PAIR, :2] = 1.0
+    recovery = Recovery(np.inf, 20.0, keeps_rate=True)
+    assert not settle_fixes(motion, prior, epochs, said, recovery).any()

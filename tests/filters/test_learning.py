@@ -1,5 +1,7 @@
 """Noise figures and priors that the multi-hypothesis filter learns, against what was put in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,28 @@ def test_the_prior_is_what_the_log_shows():
     prior = learnt(trial_of("one-axis", "alone", 4)).prior
     assert prior.partial == pytest.approx(0.2, abs=0.04)
     assert prior.isolated < 0.04
+
+
+def test_how_many_errors_are_small_is_learnt():
+    """None of less than 10 σ among many wrong fixes; where most are smaller nothing is denied."""
+    for seed in range(3):
+        none, some = (
+            learnt(trial_of(name, "alone", seed, axes=1)).prior.small
+            for name in ("isolated-40", "small")
+        )
+        assert none < 0.2
+        assert some > 0.5
+    assert learnt(trial_of("clean", "alone", 0)).prior.small == 1.0
+
+
+def test_the_size_of_small_errors_is_learnt_at_any_noise():
+    world = draw_world([13, 5], epochs=600, axes=2)
+    sizes = []
+    for sigma in (0.05, 5.0):
+        trial = alone(draw("small", replace(world, sigma_m=sigma), [13, 5]))
+        sizes.append(learnt(trial).prior.spread[0] / sigma)
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
+    assert 4.0 < sizes[0] < 8.0
 
 
 def test_a_run_of_wrong_velocities_is_no_livelier_motion():

@@ -1,12 +1,16 @@
 """Velocities of few digits: never believed beyond the last one, also where they never change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from surefix.comparison.run import clean_trial
 from surefix.io.nmea_sentence import KNOT
 from surefix.pipelines.clean import clean_sources
 from surefix.pipelines.inputs import open_inputs
 from surefix.pipelines.options import CleanOptions
+from surefix.simulate.contamination import alone, draw, draw_world
 from surefix.types import Verdict
 
 N, SPEED, COURSE = 1000, 5.0 * KNOT, np.radians(50.0)
@@ -56,6 +60,38 @@ def test_the_track_is_not_nailed_to_a_velocity_that_hardly_changes(wanders, valu
         off = cleaned.track.position[50:, :2] - place[50:]
         assert np.sqrt((off**2).mean()) < 0.5  # fixes alone: 0.3 at best; nailed to them: 1.1
         assert not (cleaned.verdicts.verdict == Verdict.REJECTED)[~wild].any()
+
+
+@pytest.mark.parametrize("mode", ["offline", "realtime"])
+@pytest.mark.parametrize("wanders", [0.004, 0.02])
+def test_sigma_knows_that_a_velocity_stays_off(wanders, mode):
+    """For as long as its last digit stays."""
+    for seed in range(2):
+        place, fixes, told, _ = under_way(seed, wanders=wanders)
+        source = {"time": np.arange(N) + 1.7e9, "x": fixes[:, 0], "y": fixes[:, 1]}
+        source |= {"vx": told[:, 0], "vy": told[:, 1]}
+        track = clean_sources(open_inputs([source]), CleanOptions(mode=mode)).track
+        off = (track.position[50:, :2] - place[50:]) / track.sigma_position[50:, :2]
+        assert 0.6 < (off**2).mean() < 2.0
+
+
+@pytest.mark.parametrize("mode", ["offline", "realtime"])
+def test_coarse_velocities_leave_sigma_honest_and_help(mode):
+    """In worlds drawn at random, with a last digit of 10 … 40 times their noise."""
+    honest, ratio = [], []
+    for seed in range(20, 24):
+        world = draw_world([seed, 3], epochs=600, axes=1 + seed % 3)
+        trial = draw("isolated-5", world, [seed, 3])
+        digit = world.sigma_mps * (10.0 + 10.0 * (seed - 20))
+        rough = replace(trial, velocities=np.round(trial.velocities / digit) * digit)
+        one, two = (clean_trial(log, "multi-hypothesis", mode) for log in (rough, alone(trial)))
+        d, sigma = world.axes, one.track.sigma_position[20:]
+        off = [(each.track.position[:, :d] - trial.position)[20:] for each in (one, two)]
+        honest.append((off[0] ** 2 / sigma[:, :d] ** 2).mean())
+        ratio.append(np.sqrt((off[0] ** 2).mean() / (off[1] ** 2).mean()))
+    assert 0.85 < np.mean(honest) < 1.2
+    assert np.max(honest) < 1.5
+    assert np.mean(ratio) < 1.0
 
 
 def test_digits_count_in_the_axes_they_were_recorded_in(tmp_path):

@@ -227,6 +227,7 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
     d, period = motion.axes, motion.period
     axes = [a for a in range(d) if not np.isnan(z[a])]
     inside, poor, square, wide, distance, shifted = {}, 0.0, {}, {}, 0.0, 0.0
+    small = all(account.seen[a] for a in axes)
     for a in axes:
         m, P = known[a]
         if not account.seen[a]:
@@ -234,6 +235,7 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
             inside[a] = cauchy(np.ones(1), np.array([wide[a]]))
             continue
         nu, S = wrap(z[a] - m[0], period), P[0, 0] + r[a]
+        small = small and nu**2 + P[0, 0] < GROSS * r[a]
         inside[a] = normal(nu, S)
         poor += normal(nu, S + (POOR - 1.0) * r[a])
         distance += nu**2 / S
@@ -253,7 +255,8 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
 
     over = {"run": -1, "open": (None,) * d}
     wrong = prior.row if not running and account.lost[axes[0]][1] >= ROW else prior.isolated
-    out = [told(used(account, []), wild(axes) + np.log(wrong), "isolated")]
+    rare = np.log(prior.small) if small else 0.0
+    out = [told(used(account, []), wild(axes) + np.log(wrong) + rare, "isolated")]
     right = np.log(1.0 - wrong) - np.log(1.0 - prior.isolated)
     account = account._replace(weight=account.weight + right)
     if own:

@@ -98,6 +98,9 @@ class Prior(NamedTuple):
         of a few; 0: they never do.
     steady
         What wanders off more slowly is taken for a bias of the velocities, m/s.
+    small
+        How many of the errors of fixes there are of less than 6 σ that a Cauchy density has
+        there, at most 1; learnt.
     """
 
     isolated: float
@@ -115,6 +118,7 @@ class Prior(NamedTuple):
     row: float = 0.3
     drag: float = 0.0
     steady: float = 0.0
+    small: float = 1.0
 
 
 class Bank(NamedTuple):

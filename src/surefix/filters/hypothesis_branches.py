@@ -194,6 +194,7 @@ def position_branches(
         math.log(prior.burst),
     )
     partial = math.log(prior.partial / (observed + 1))
+    rare = math.log(prior.small)
     drags = -1  # a depth alone does not wander off
     if lead == 0 and not decided:
         drags = supposes(prior, bank, place, time, sensor)
@@ -205,6 +206,7 @@ def position_branches(
         distance = near = square = offset = stray = 0.0
         volume = wider = whole = 1.0
         unknown = due = False
+        small = not decided
         for a in range(d):
             if math.isnan(z[a]):
                 continue
@@ -212,6 +214,7 @@ def position_branches(
             if not bank.seen[k, a]:
                 wide[a] = s2 + variance[a]
                 wild[a] = 1.0
+                small = False
                 close[a] = 0.0
                 S[a] = first_fix(wide[a])
                 unknown = True
@@ -220,6 +223,7 @@ def position_branches(
                 S[a] = bank.covariance[k, a, 0, 0] + variance[a]
                 wide[a] = s2 + S[a]
                 poorer = S[a] + variance[a] * _POORER
+                small = small and nu * nu + S[a] < (GROSS + 1.0) * variance[a]
                 close[a], wild[a] = nu * nu / S[a], nu * nu / wide[a]
                 near += nu * nu / poorer
                 wider *= poorer
@@ -272,7 +276,7 @@ def position_branches(
         parent[total] = i
         total += 1
         outside = wild_product(square, whole, observed)
-        score[total] = usual + outside + wrong
+        score[total] = usual + outside + wrong + (rare if small else 0.0)
         parent[total], code[total] = i, mask
         total += 1
         if walks and not outlasts(prior, bank, k, time):

@@ -149,7 +149,10 @@ def _patterns(
     seen: int,
     row: float,
 ) -> int:
-    """Axes that are wrong under the likeliest account of one fix, as a code of the filter."""
+    """Axes that are wrong under the likeliest account of one fix, as a code of the filter.
+
+    ``row`` is the logarithm of how much likelier than usual it is that all are wrong.
+    """
     belongs = 0.0
     square = 0.0
     scale = 0.0
@@ -204,6 +207,7 @@ def _review(
             poor = 0.0
             square = 0.0
             scale = 0.0
+            small = True
             for a in range(axes):
                 c = part * axes + a
                 wild[a] = np.nan
@@ -211,6 +215,7 @@ def _review(
                 if math.isnan(e):
                     continue
                 seen += 1
+                small = small and e * e + S < (GROSS + 1.0) * noise[k, c]
                 inside[a] = log_normal(e, S)
                 poor += log_normal(e, S + noise[k, c] * (1.0 / POOR_WEIGHT - 1.0))
                 wide[a] = prior.spread[c] * prior.spread[c] + S
@@ -230,7 +235,8 @@ def _review(
                 for a in range(axes):
                     out[k, axes + a] = w if max(good, fair) >= outside else 0.0
                 continue
-            mask = _patterns(axes, prior, inside, poor, wild, wide, seen, row[k])
+            odds = row[k] + (math.log(prior.small) if small else 0.0)
+            mask = _patterns(axes, prior, inside, poor, wild, wide, seen, odds)
             for a in range(axes):
                 w = POOR_WEIGHT if mask & POOR else 1.0
                 out[k, a] = 0.0 if (mask >> a) & 1 else w

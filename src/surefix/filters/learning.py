@@ -12,13 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.filters.hypotheses import POOR_WEIGHT, Prior, no_hypotheses
+from surefix.filters.hypotheses import Prior, no_hypotheses
 from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
+from surefix.filters.learning_shares import counted
 from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.multi_hypothesis_modes import decide_offline
 from surefix.filters.noise import NoiseFigures, Observations, initial_scales, sample_of, variances
 from surefix.filters.records import Epochs, Motion
+from surefix.filters.rounding import rounding_noise
 from surefix.filters.simplex import descend
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray
@@ -28,17 +30,8 @@ __all__ = ["Learnt", "learn", "likelihood", "supposed"]
 _ROUNDS = 3
 _ENOUGH = 0.02  # relative change of the figures, and change of the shares, that ends the rounds
 _WILD = 30.0  # scale of gross errors to begin with, in standard deviations
-_LEAST_WILD = 5.0  # … and at least
-_SHARES = {
-    "isolated": (2.0, 50.0),
-    "partial": (0.2, 50.0),
-    "poor": (0.5, 50.0),
-    "manoeuvre": (0.02, 100.0),
-    "row": (1.0, 3.0),
-}  # prior counts: wrong, and all
 _DRAG = 1e-5  # probability that a drag begins in a stretch of eight fixes, if any do
 _BIAS = 2.0  # standard deviations that velocities may be wrong by for good
-_FEW = 5  # gross errors whose scale is believed
 _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at first
 _FEWEST = 0.1  # share of good triples of neighbours that tell the scale of differences …
 _DIFFER = 0.25  # … and share of the scale of differences that no figure to begin with falls below
@@ -46,6 +39,8 @@ _MANY = 0.2  # share of gross errors supposed meanwhile, in rows or not
 _BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
 _LEAST = 0.3  # share of the figures begun with that none falls below
+_NO_DIGIT = 1e-8  # m/s, below which velocities are not rounded
+_MATTERS = 1.05  # … and how much more than white noise rounding must cost to count
 _BEGIN = 3  # epochs whose likelihood is that of the start
 
 
@@ -143,13 +138,20 @@ def learn(
         position=np.maximum(figures.position * _LEAST, floor[0]),
         velocity=np.maximum(figures.velocity * _LEAST, floor[1]),
     )
+    noisy = None
     for _ in range(_ROUNDS):
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
         said, filtered, smoothed = decide_offline(motion, prior, epochs)
-        residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
         supposed_before, before = prior, figures
-        prior = _counted(prior, said, residual, math.sqrt(float(np.median(epochs.variance))))
+        prior = counted(prior, said, residual, variance, epochs.variance)
         figures = _likeliest(sample, said, prior, given, before, least, motion)
+        if noisy is None:
+            noisy = np.sqrt(np.maximum(figures.velocity**2 - floor[1] ** 2, 0.0))
+        rounded = _rounded(observations, figures, noisy, floor[1], order)
+        least = least._replace(velocity=np.fmax(least.velocity, rounded))
+        higher = np.where(np.isnan(given.velocity), least.velocity, 0.0)
+        figures = figures._replace(velocity=np.maximum(figures.velocity, higher))
         if _change(before, figures) < _ENOUGH and _moved(supposed_before, prior) < _ENOUGH:
             break
     return Learnt(figures, prior)
@@ -184,6 +186,48 @@ def likelihood(
     return _evidence(motion, figures, prior, epochs, _BRIEFLY)
 
 
+def _rounded(
+    observations: Observations, figures: NoiseFigures, noisy: FloatArray, floor: float, order: int
+) -> FloatArray:
+    """(sensors,) what velocities are worth at best for their digits; 0 where they do not matter.
+
+    Parameters
+    ----------
+    observations, figures, order
+        The log, its figures so far, and the motion model.
+    noisy
+        (sensors,) noise of the velocities before they were rounded.
+    floor
+        What rounding costs if it is white.
+    """
+    axes = observations.z.shape[1] // 2
+    least = np.zeros_like(noisy)
+    every, between = (
+        _interval(observations.time, observations.z[:, part])
+        for part in (slice(axes, None), slice(axes))
+    )
+    if not (every > 0.0 and between > 0.0 and floor > _NO_DIGIT):
+        return least
+    change = figures.process * math.sqrt(every)
+    if order > 2:
+        steps = np.diff(
+            observations.z[np.isfinite(observations.z[:, axes:]).all(axis=1), axes:], axis=0
+        )
+        change = float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
+    weight = _usual(figures)[0] * math.sqrt(between)
+    for s in np.flatnonzero(np.isfinite(noisy)):
+        white = math.hypot(floor, noisy[s])
+        worth = rounding_noise(floor * math.sqrt(12.0), change, every, weight, float(noisy[s]))
+        least[s] = worth if worth > _MATTERS * white else 0.0
+    return least
+
+
+def _interval(time: FloatArray, z: FloatArray) -> float:
+    """Median time between what is observed, s; 0 where there is too little."""
+    steps = np.diff(time[np.isfinite(z).any(axis=1)])
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+
+
 def _motion(figures: NoiseFigures, axes: int, order: int, period: float) -> Motion:
     return Motion(order, axes, np.full(axes, figures.process**2), by_axis(axes), 2 * axes, period)
 
@@ -205,40 +249,6 @@ def _usual(figures: NoiseFigures) -> tuple[float, float]:
     known = [part[np.isfinite(part)] for part in (figures.position, figures.velocity)]
     position, velocity = (float(np.median(part)) if len(part) else 1.0 for part in known)
     return position, velocity
-
-
-def _counted(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) -> Prior:
-    """Shares and size of the gross errors among the positions that were decided."""
-    fixed = said.fixed
-    axes = fixed.shape[1] // 2
-    seen = np.isfinite(residual[:, :axes])
-    out = seen & (fixed[:, :axes] == 0.0)
-    whole = out.any(axis=1) & (out == seen).all(axis=1)
-    poor = (fixed[:, :axes] == POOR_WEIGHT).any(axis=1) & seen.any(axis=1)
-    some = out.any(axis=1) & ~whole
-    turns = (said.jump >> axes > 0).sum()
-    total = seen.any(axis=1).sum()
-
-    placed = seen.any(axis=1)
-    alone = whole[placed] & (said.run[placed] == 0)
-    after = alone[:-2] & alone[1:-1]
-
-    def share(name: str, count: int, among: int | None = None) -> float:
-        wrong, everything = _SHARES[name]
-        return float((count + wrong) / ((total if among is None else among) + everything))
-
-    spread = prior.spread.copy()
-    if out.sum() >= _FEW:
-        size = float(np.median(np.abs(residual[:, :axes][out])))
-        spread[:axes] = max(size, _LEAST_WILD * sigma)
-    return prior._replace(
-        isolated=share("isolated", alone.sum()),
-        partial=share("partial", some.sum()),
-        poor=share("poor", poor.sum()),
-        manoeuvre=share("manoeuvre", turns),
-        row=min(share("row", (after & alone[2:]).sum(), after.sum()), 1.0 - prior.ending),
-        spread=spread,
-    )
 
 
 def _likeliest(

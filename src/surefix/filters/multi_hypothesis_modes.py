@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
-from surefix.filters.hypothesis_disputes import settle_velocities
+from surefix.filters.hypothesis_disputes import settle_fixes, settle_velocities
 from surefix.filters.hypothesis_lag import (
     Followed,
     filter_decided,
@@ -188,6 +188,9 @@ def decide_offline(
         smoothed = smooth(motion, recovery, epochs.time, filtered)
         jump = needed_jumps(motion, epochs, said.jump, smoothed)
         fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
+        amid = settle_fixes(motion, prior, epochs, said._replace(fixed=fixed, jump=jump), recovery)
+        fixed[amid, :d] = 0.0
+        locked[:, 0] |= amid
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
         said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
