@@ -11,12 +11,27 @@ import gc
 from typing import Any
 
 from numba import _dynfunc
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
 __all__ = ["KernelCompiler", "PartCompiler"]
+
+# They look for closures, comprehensions and expressions of whole arrays, which would allocate.
+_NEEDLESS = {
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.InlineOverloads,
+    typed_passes.NopythonRewrites,
+}
 
 
 class _Flags(Flags):
@@ -43,8 +58,11 @@ class KernelCompiler(CompilerBase):
         self.state.flags = _Flags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
-        """Steps of a compilation, as Numba's."""
-        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+        """Steps of a compilation: Numba's without those that a lean function has no use for."""
+        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        if not self.state.flags.nrt:
+            return _with_steps(steps, [each for each in steps.passes if each[0] not in _NEEDLESS])
+        return [steps]
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
@@ -63,14 +81,15 @@ class PartCompiler(KernelCompiler):
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation, the last but one replaced."""
         (steps,) = super().define_pipelines()
-        steps.passes = [(_swapped(step), said) for step, said in steps.passes]
-        steps._finalized = False
-        steps.finalize()
-        return [steps]
+        swapped = {NativeLowering: _PartLowering}
+        return _with_steps(steps, [(swapped.get(step, step), said) for step, said in steps.passes])
 
 
-def _swapped(step: Any) -> Any:
-    return _PartLowering if step is NativeLowering else step
+def _with_steps(pipeline: Any, steps: list[Any]) -> list[Any]:
+    pipeline.passes = steps
+    pipeline._finalized = False
+    pipeline.finalize()
+    return [pipeline]
 
 
 class _Part(JITCodeLibrary):
