@@ -3,21 +3,26 @@
 Numba compiles each function that a kernel calls as if Python could call it, too: it optimises it,
 with all that it calls in turn, and makes machine code of it. Here such a *part* is only translated;
 it is optimised and becomes machine code once, inside of the kernel.
+
+What was compiled is kept on disk such that processes which compile at the same time cannot mistake
+the code of one signature, or of an older source, for another.
 """
 
 from __future__ import annotations
 
 import gc
+import hashlib
 from typing import Any
 
-from numba import _dynfunc
+from numba import _dynfunc  # type: ignore[attr-defined]
 from numba.core import typed_passes, untyped_passes
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["KernelCompiler", "PartCompiler"]
+__all__ = ["KernelCache", "KernelCompiler", "PartCompiler"]
 
 # They look for closures, comprehensions and expressions of whole arrays, which would allocate.
 _NEEDLESS = {
@@ -46,12 +51,38 @@ class _Flags(Flags):
         return NotImplemented
 
 
+class _Kernel(JITCodeLibrary):
+    """Code of a kernel.
+
+    Numba is told of the machine code while LLVM makes it. An exception that comes up there, such as
+    that of Ctrl-C, is dropped, and the code with it; then it is made again.
+    """
+
+    def _get_compiled_object(self) -> Any:
+        if self._compiled_object is None:
+            self._compiled_object = self._codegen._tm.emit_object(self._final_module)  # noqa: SLF001
+        return self._compiled_object
+
+
+class _Part(JITCodeLibrary):
+    """Code of a part and of the parts that it calls, not optimised and not for the processor."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
 class KernelCompiler(CompilerBase):
     """Numba's own way, without a search for garbage.
 
     Nearly all that a compilation makes is in use until its end: to look it through again and again
     is a tenth of the time.
     """
+
+    _library: type[JITCodeLibrary] = _Kernel
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -66,6 +97,9 @@ class KernelCompiler(CompilerBase):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = self._library(codegen, func.__qualname__)
+        self.state.library.enable_object_caching()
         collecting = gc.isenabled()
         gc.disable()
         try:
@@ -78,6 +112,8 @@ class KernelCompiler(CompilerBase):
 class PartCompiler(KernelCompiler):
     """Compile a function that only kernels call, without making machine code of it."""
 
+    _library = _Part
+
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation, the last but one replaced."""
         (steps,) = super().define_pipelines()
@@ -86,21 +122,11 @@ class PartCompiler(KernelCompiler):
 
 
 def _with_steps(pipeline: Any, steps: list[Any]) -> list[Any]:
-    pipeline.passes = steps
-    pipeline._finalized = False
-    pipeline.finalize()
-    return [pipeline]
-
-
-class _Part(JITCodeLibrary):
-    """Code of a part and of the parts that it calls, not optimised and not for the processor."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
+    made = PassManager(pipeline.pipeline_name)
+    for step, said in steps:
+        made.add_pass(step, said)
+    made.finalize()
+    return [made]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -110,7 +136,6 @@ class _PartLowering(NativeLowering):
     _name = "surefix_part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         made = state["cr"]
@@ -122,3 +147,53 @@ class _PartLowering(NativeLowering):
         state.targetctx.insert_user_function(handle, made.fndesc, [state.library])
         state["cr"] = made._replace(cfunc=handle)
         return True
+
+
+class KernelCache(FunctionCache):
+    """What was compiled of a kernel, kept on disk for processes that compile side by side.
+
+    Raises
+    ------
+    RuntimeError
+        There is no folder that can be written to.
+    """
+
+    _cache_file: _CacheFile
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
+        self._cache_file = _CacheFile(self._cache_path, base, stamp)
+
+    def empty(self) -> bool:
+        """Tell whether nothing was compiled yet."""
+        return not self._cache_file.index()
+
+
+class _CacheFile(IndexDataCacheFile):
+    """Where the machine code of a kernel is kept.
+
+    Numba gives the files numbers, two processes the same to different signatures, and writes the
+    index first, so that for a moment it names a file that an older source left. Here the name
+    follows from the signature, the file tells what it holds, and the index comes after it. An entry
+    that another process overwrites is compiled again.
+    """
+
+    def index(self) -> dict[Any, str]:
+        """Names of the files of what there is."""
+        found: dict[Any, str] = self._load_index()
+        return found
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save code; ``key`` is its signature, the processor and the source of the kernel."""
+        digest = hashlib.sha256(repr(key[:2]).encode()).hexdigest()
+        name = self._data_name(int(digest[:12], 16))
+        self._save_data(name, (self._source_stamp, key, data))
+        index = self.index()
+        index[key] = name
+        self._save_index(index)
+
+    def load(self, key: Any) -> Any:
+        """What was saved under this key, or nothing."""
+        stamp, of, data = super().load(key) or (None, None, None)
+        return data if (stamp, of) == (self._source_stamp, key) else None

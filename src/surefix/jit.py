@@ -7,14 +7,14 @@ machine code on disk. With ``NUMBA_DISABLE_JIT=1`` the same source runs uncompil
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-from surefix.compiling import KernelCompiler, PartCompiler
+from surefix.compiling import KernelCache, KernelCompiler, PartCompiler
 
 __all__ = [
     "compilations",
@@ -24,6 +24,7 @@ __all__ = [
     "kernel",
     "lean_helper",
     "lean_kernel",
+    "on_disk",
     "threaded_kernel",
 ]
 
@@ -31,7 +32,6 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _KERNEL: Final[Mapping[str, Any]] = {
-    "cache": True,
     "error_model": "numpy",
     "no_cfunc_wrapper": True,
     "pipeline_class": KernelCompiler,
@@ -71,9 +71,15 @@ class _Watch(event.Listener):
         self._depth -= 1
 
 
+def on_disk(kernel: Callable[..., object]) -> bool:
+    """Tell whether anything of a kernel was compiled before, or need not be."""
+    cache = getattr(kernel, "_cache", None)
+    return not isinstance(cache, KernelCache) or not cache.empty()
+
+
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that Python calls; its machine code is cached on disk."""
-    return cast(Callable[P, T], numba.njit(**_KERNEL)(function))
+    return _kept(function)
 
 
 def helper(function: Callable[P, T]) -> Callable[P, T]:
@@ -94,7 +100,7 @@ def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
     Counting them, an atomic operation for each slice, costs a small kernel more than its work. A
     product and a sum may become one instruction.
     """
-    return cast(Callable[P, T], numba.njit(**_KERNEL, **_LEAN)(function))
+    return _kept(function, **_LEAN)
 
 
 def lean_helper(function: Callable[P, T]) -> Callable[P, T]:
@@ -126,4 +132,13 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
 
 def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
-    return cast(Callable[P, T], numba.njit(nogil=True, **_KERNEL)(function))
+    return _kept(function, nogil=True)
+
+
+def _kept(function: Callable[P, T], **options: Any) -> Callable[P, T]:
+    """Compile a function and keep it on disk, where there is a folder for it."""
+    made = numba.njit(**_KERNEL, **options)(function)
+    if hasattr(made, "_cache"):  # not with NUMBA_DISABLE_JIT
+        with suppress(RuntimeError):  # there is none that can be written to
+            made._cache = KernelCache(function)  # noqa: SLF001
+    return cast(Callable[P, T], made)
