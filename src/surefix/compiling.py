@@ -162,8 +162,8 @@ class KernelCache(FunctionCache):
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
-        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
-        self._cache_file = _CacheFile(self._cache_path, base, stamp)
+        base, stamp = f"{self._impl.filename_base}.own", self._impl.locator.get_source_stamp()
+        self._cache_file = _CacheFile(self._cache_path, base, stamp)  # not a file of Numba's
 
     def empty(self) -> bool:
         """Tell whether nothing was compiled yet."""
