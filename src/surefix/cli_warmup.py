@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from surefix.cli_begin import begin
+
 if TYPE_CHECKING:
     from surefix.pipelines.options import CleanOptions
 
@@ -88,6 +90,7 @@ def _side_by_side(names: Sequence[str], told: Callable[[str, int], None]) -> int
 
 
 def _compile(name: str) -> int:
+    begin()
     from surefix.pipelines.warmup import compile_part
 
     return compile_part(name)
