@@ -86,7 +86,7 @@ def test_processes_that_save_at_once_do_not_mistake_their_code(
     one.save(keys[0], "of floats")
     other.save(keys[1], "of integers")
     reader = KernelCache(_double)._cache_file
-    assert reader.load(keys[0]) in (None, "of floats")
+    assert reader.load(keys[0]) == "of floats"
     assert reader.load(keys[1]) == "of integers"
 
 
@@ -97,9 +97,8 @@ def test_code_of_an_older_source_is_not_taken(
     key = ((numba.float64,), "processor", "code")
     file = KernelCache(_double)._cache_file
     file.save(key, "old")
-    name = file.index()[key]
+    assert file.load(key) == "old"
     file._source_stamp = ("a later time", 1)
-    file._save_index({key: name})  # as Numba does before the new code is there
     assert file.load(key) is None
 
 

@@ -175,8 +175,8 @@ class _CacheFile(IndexDataCacheFile):
 
     Numba gives the files numbers, two processes the same to different signatures, and writes the
     index first, so that for a moment it names a file that an older source left. Here the name
-    follows from the signature, the file tells what it holds, and the index comes after it. An entry
-    that another process overwrites is compiled again.
+    follows from the signature and the file tells what it holds; the index, of which processes may
+    overwrite entries, only says that there is something.
     """
 
     def index(self) -> dict[Any, str]:
@@ -186,14 +186,18 @@ class _CacheFile(IndexDataCacheFile):
 
     def save(self, key: Any, data: Any) -> None:
         """Save code; ``key`` is its signature, the processor and the source of the kernel."""
-        digest = hashlib.sha256(repr(key[:2]).encode()).hexdigest()
-        name = self._data_name(int(digest[:12], 16))
+        name = self._name(key)
         self._save_data(name, (self._source_stamp, key, data))
-        index = self.index()
-        index[key] = name
-        self._save_index(index)
+        self._save_index(self.index() | {key: name})
 
     def load(self, key: Any) -> Any:
         """What was saved under this key, or nothing."""
-        stamp, of, data = super().load(key) or (None, None, None)
+        try:
+            stamp, of, data = self._load_data(self._name(key))
+        except OSError:
+            return None
         return data if (stamp, of) == (self._source_stamp, key) else None
+
+    def _name(self, key: Any) -> str:
+        digest = hashlib.sha256(repr(key[:2]).encode()).hexdigest()
+        return str(self._data_name(int(digest[:12], 16)))
