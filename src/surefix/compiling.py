@@ -1,8 +1,8 @@
 """How Numba compiles kernels and their parts, with less work than it does by itself.
 
 Numba compiles each function that a kernel calls as if Python could call it, too: it optimises it,
-with all that it calls in turn, and makes machine code of it. Here such a *part* is only translated;
-it is optimised and becomes machine code once, inside of the kernel.
+with all that it calls in turn, and makes machine code of it. Here such a *part* is only translated,
+and optimised if it may allocate; it becomes machine code once, inside of the kernel.
 
 What was compiled is kept on disk such that processes which compile at the same time cannot mistake
 the code of one signature, or of an older source, for another.
@@ -66,14 +66,18 @@ class _Kernel(JITCodeLibrary):
 
 
 class _Part(JITCodeLibrary):
-    """Code of a part and of the parts that it calls, not optimised and not for the processor."""
-
-    def _optimize_final_module(self) -> None:
-        pass
+    """Code of a part and of the parts that it calls, not for the processor."""
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._finalized = True
+
+
+class _LeanPart(_Part):
+    """Without references that are counted there is nothing to gain before it is in the kernel."""
+
+    def _optimize_final_module(self) -> None:
+        pass
 
 
 class KernelCompiler(CompilerBase):
@@ -84,6 +88,7 @@ class KernelCompiler(CompilerBase):
     """
 
     _library: type[JITCodeLibrary] = _Kernel
+    _lean_library: type[JITCodeLibrary] = _Kernel
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -99,7 +104,8 @@ class KernelCompiler(CompilerBase):
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
         codegen = self.state.targetctx.codegen()
-        self.state.library = self._library(codegen, func.__qualname__)
+        library = self._library if self.state.flags.nrt else self._lean_library
+        self.state.library = library(codegen, func.__qualname__)
         self.state.library.enable_object_caching()
         collecting = gc.isenabled()
         gc.disable()
@@ -114,6 +120,7 @@ class PartCompiler(KernelCompiler):
     """Compile a function that only kernels call, without making machine code of it."""
 
     _library = _Part
+    _lean_library = _LeanPart
 
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation, the last but one replaced."""
