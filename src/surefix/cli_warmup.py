@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
-from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 import typer
@@ -92,6 +91,8 @@ def _side_by_side(names: Sequence[str], told: Callable[[str, int], None]) -> int
 
 
 def _compile(name: str) -> int:
+    from multiprocessing import parent_process
+
     if parent_process() is not None:  # it may end at once: it has no drafts to remove
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
     begin()
