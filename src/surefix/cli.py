@@ -213,7 +213,7 @@ def clean(
     given = (*inputs, *beside.values(), *(ship or []), options, edits)
     files = [Path(path) for path in given if path is not None]
     keep_inputs(files, [*(output or []), *([report] if report is not None else [])])
-    with announced(), over_bytes(files, quiet=as_json) as told:
+    with announced(chosen), over_bytes(files, quiet=as_json) as told:
         sources = open_inputs(
             inputs,
             **beside,
@@ -279,13 +279,12 @@ def demo(
     """Simulate an ROV dive, clean it, and hold the result against the truth."""
     typer.echo("Simulating a dive with USBL, DVL and depth, and cleaning it …")
     from surefix.pipelines.demo import demonstrate
+    from surefix.pipelines.options import CleanOptions
 
-    with announced():
+    with announced(CleanOptions()):
         done = demonstrate(folder, seed)
-    for line in done.lines:
+    for line in (*done.lines, *(f"wrote {path}" for path in done.written)):
         typer.echo(f"  {line}")
-    for path in done.written:
-        typer.echo(f"  wrote {path}")
 
 
 @app.command()

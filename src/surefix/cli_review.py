@@ -109,7 +109,7 @@ def review(
     for name, values in given.items():
         words += [word for value in values if value is not None for word in (name, str(value))]
     words += ["--no-checksum"] if no_checksum else []
-    with announced(), over_bytes(files, quiet=False) as told:
+    with announced(chosen), over_bytes(files, quiet=False) as told:
         begun = begin_review(opener, chosen, edits, files, told)
     server = open_server(begun, f"{Path(inputs[0]).stem}.clean", shlex.join(words), port)
     typer.echo(f"open {server.url}")

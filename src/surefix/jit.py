@@ -7,12 +7,14 @@ machine code on disk. With ``NUMBA_DISABLE_JIT=1`` the same source runs uncompil
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import event
 from numba.extending import register_jitable
+
+from surefix.compiling import KernelCache, KernelCompiler, PartCompiler
 
 __all__ = [
     "compilations",
@@ -22,17 +24,25 @@ __all__ = [
     "kernel",
     "lean_helper",
     "lean_kernel",
+    "on_disk",
     "threaded_kernel",
 ]
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_LEAN: Final[Mapping[str, Any]] = {
-    "_nrt": False,
+_KERNEL: Final[Mapping[str, Any]] = {
+    "error_model": "numpy",
     "no_cfunc_wrapper": True,
-    "fastmath": {"contract"},
+    "pipeline_class": KernelCompiler,
 }
+_PART: Final[Mapping[str, Any]] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": PartCompiler,
+}
+_LEAN: Final[Mapping[str, Any]] = {"_nrt": False, "fastmath": {"contract"}}
 
 
 @contextmanager
@@ -61,9 +71,15 @@ class _Watch(event.Listener):
         self._depth -= 1
 
 
+def on_disk(kernel: Callable[..., object]) -> bool:
+    """Tell whether anything of a kernel was compiled before, or need not be."""
+    cache = getattr(kernel, "_cache", None)
+    return not isinstance(cache, KernelCache) or not cache.empty()
+
+
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that Python calls; its machine code is cached on disk."""
-    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy")(function))
+    return _kept(function)
 
 
 def helper(function: Callable[P, T]) -> Callable[P, T]:
@@ -73,7 +89,7 @@ def helper(function: Callable[P, T]) -> Callable[P, T]:
     on disk, and one version serves all constants it is called with: that saves a tenth to a half of
     the compilation.
     """
-    part = register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    part = register_jitable(**_PART)
     compiled: Callable[P, T] = part(function)
     return compiled
 
@@ -84,8 +100,7 @@ def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
     Counting them, an atomic operation for each slice, costs a small kernel more than its work. A
     product and a sum may become one instruction.
     """
-    lean = numba.njit(cache=True, error_model="numpy", **_LEAN)
-    return cast(Callable[P, T], lean(function))
+    return _kept(function, **_LEAN)
 
 
 def lean_helper(function: Callable[P, T]) -> Callable[P, T]:
@@ -93,7 +108,7 @@ def lean_helper(function: Callable[P, T]) -> Callable[P, T]:
 
     No way in from Python is made, where it stays as it is written.
     """
-    return register_jitable(error_model="numpy", **_LEAN)(function)
+    return register_jitable(**_PART, **_LEAN)(function)
 
 
 def inner(function: Callable[P, T]) -> Callable[P, T]:
@@ -101,7 +116,7 @@ def inner(function: Callable[P, T]) -> Callable[P, T]:
 
     That is for what is called often or from one place: it is compiled at every place anew.
     """
-    return register_jitable(error_model="numpy", forceinline=True, **_LEAN)(function)
+    return register_jitable(forceinline=True, **_PART, **_LEAN)(function)
 
 
 def inlined(function: Callable[P, T]) -> Callable[P, T]:
@@ -110,17 +125,20 @@ def inlined(function: Callable[P, T]) -> Callable[P, T]:
     Sizes that the caller knows (see `surefix.rows`) are then known inside, and no array is counted
     on the way. A product and a sum may become one instruction.
     """
-    part = register_jitable(
-        error_model="numpy",
-        forceinline=True,
-        fastmath={"contract"},
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-    )
+    part = register_jitable(forceinline=True, fastmath={"contract"}, **_PART)
     inside: Callable[P, T] = part(function)
     return inside
 
 
 def threaded_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that lets go of the interpreter, so that threads can run it side by side."""
-    return cast(Callable[P, T], numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    return _kept(function, nogil=True)
+
+
+def _kept(function: Callable[P, T], **options: Any) -> Callable[P, T]:
+    """Compile a function and keep it on disk, where there is a folder for it."""
+    made = numba.njit(**_KERNEL, **options)(function)
+    if hasattr(made, "_cache"):  # not with NUMBA_DISABLE_JIT
+        with suppress(RuntimeError):  # there is none that can be written to
+            made._cache = KernelCache(function)  # noqa: SLF001
+    return cast(Callable[P, T], made)

@@ -1,78 +1,72 @@
-"""Compile ahead what cleaning a log needs, in several processes at once.
+"""Compile ahead what cleaning a log needs, in parts that can be compiled side by side.
 
 Numba compiles a kernel when it is first called and keeps the machine code on disk. Here all that
-`surefix clean` calls is called once, on a log of a few dozen rows: nothing is compiled then that
-`clean` would not use, and nothing is left out that it does.
+`surefix clean` calls is called once, on a log of a few dozen rows. No kernel is in two parts, so
+that no two processes compile the same.
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from typing import NamedTuple
 
 import numpy as np
 
-from surefix.filters.hypotheses import no_hypotheses
-from surefix.filters.learning import supposed
-from surefix.filters.multi_hypothesis_modes import offline_hypotheses, realtime_hypotheses
-from surefix.filters.records import Epochs, Motion
-from surefix.filters.track import by_axis
-from surefix.io.nmea_scan import scan
-from surefix.io.table import from_frame
-from surefix.jit import compilations
+from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.track import by_axis, filter_track, start
+from surefix.jit import compilations, on_disk
 from surefix.pipelines.clean import Source, clean_sources
 from surefix.pipelines.options import CleanOptions, Mode
 
-__all__ = ["PARTS", "compile_part", "warm_up"]
+__all__ = ["PARTS", "Part", "compile_part", "missing", "parts_for"]
 
 _ROWS = 60
 _MODES: tuple[Mode, ...] = ("realtime", "lagged", "offline")
 
 
-def warm_up(told: Callable[[str, int], None], *, processes: int | None = None) -> int:
-    """Compile what is not on disk yet; gives the number of kernels compiled.
+class Part(NamedTuple):
+    """Kernels that are compiled one after the other.
 
     Parameters
     ----------
-    told
-        Called with the name of each part that is ready, and how many kernels it compiled.
-    processes
-        At most so many at once; default as many as the machine has cores.
+    call
+        Calls each of them.
+    module, kernel
+        The one that takes longest.
     """
-    total = 0
-    for names in (tuple(PARTS), ("all",)):
-        workers = min(processes or os.cpu_count() or 1, len(names))
-        for name, count in _in_processes(names, workers) if workers > 1 else _here(names):
-            told(name, count)
-            total += count
-    return total
+
+    call: Callable[[], None]
+    module: str
+    kernel: str
 
 
-def _here(names: tuple[str, ...]) -> Iterator[tuple[str, int]]:
-    for name in names:
-        yield name, compile_part(name)
+def parts_for(options: CleanOptions) -> tuple[str, ...]:
+    """Names of the parts that a log of fixes cleaned with these options calls."""
+    if options.method in ("53h", "hampel", "median"):
+        return ("filter and smoother", "cleaners")
+    if options.method != "multi-hypothesis":
+        return ("filter and smoother",)
+    lagged = ("fixed lag",) if options.mode == "lagged" else ()
+    return ("hypotheses", "filter and smoother", *lagged)
 
 
-def _in_processes(names: tuple[str, ...], workers: int) -> Iterator[tuple[str, int]]:
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawn) as pool:
-        waiting = {pool.submit(compile_part, name): name for name in names}
-        for done in as_completed(waiting):
-            yield waiting[done], done.result()
+def missing(names: Iterable[str]) -> list[str]:
+    """Those parts of which nothing is on disk, in the order of `PARTS`."""
+    wanted = set(names)
+    return [name for name in PARTS if name in wanted and not on_disk(_kernel(PARTS[name]))]
+
+
+def _kernel(part: Part) -> Callable[..., object]:
+    kernel: Callable[..., object] = getattr(import_module(part.module), part.kernel)
+    return kernel
 
 
 def compile_part(name: str) -> int:
-    """Compile one of `PARTS`, or ``all`` there is; gives the number of kernels compiled."""
+    """Compile one of `PARTS`; gives the number of kernels that were not on disk yet."""
     with _counted() as count:
-        if name != "all":
-            PARTS[name]()
-        else:
-            for part in PARTS.values():
-                part()
-            _clean("multi-hypothesis")
+        PARTS[name].call()
     return count[0]
 
 
@@ -87,49 +81,92 @@ def _counted() -> Iterator[list[int]]:
         yield count
 
 
-def _hypotheses() -> None:
-    """The hypotheses by themselves: what `clean` needs before them is another part."""
+def _epochs(axes: int) -> tuple[Motion, Epochs]:
+    """A vehicle that goes straight on, with a wild fix."""
     time = np.arange(float(_ROWS))
-    z = np.column_stack([time, -time, np.full((_ROWS, 2), np.nan)])
+    z = np.full((_ROWS, 2 * axes), np.nan)
+    z[:, :axes] = time[:, None]
     z[_ROWS // 2, 0] += 50.0
-    epochs = Epochs(
-        time, z, np.ones((_ROWS, 4)), np.full((_ROWS, 4), np.nan), np.zeros(_ROWS, np.int64),
-        np.zeros(_ROWS, np.int64),
-    )  # fmt: skip
-    motion = Motion(2, 2, np.full(2, 0.01), by_axis(2), 4, 0.0)
+    none = np.zeros(_ROWS, np.int64)
+    epochs = Epochs(time, z, np.ones_like(z), np.full_like(z, np.nan), none, none)
+    return Motion(2, axes, np.full(axes, 0.01), by_axis(axes), 2 * axes, 0.0), epochs
+
+
+def _hypotheses() -> None:
+    from surefix.filters.hypotheses import no_hypotheses
+    from surefix.filters.hypothesis_trail import decide, follow, runs, undecided
+    from surefix.filters.learning import supposed
+    from surefix.filters.multi_hypothesis import filter_hypotheses
+
+    motion, epochs = _epochs(2)
     prior = supposed(2, 1.0, 1.0, 1.0, 39.5)
-    realtime_hypotheses(motion, prior, epochs, no_hypotheses(motion))
-    offline_hypotheses(motion, prior, epochs)
+    _, _, trail = filter_hypotheses(motion, prior, epochs, no_hypotheses(motion))
+    said = undecided(motion, _ROWS)
+    decide(motion, np.isfinite(epochs.z), trail, _ROWS - 1, 0, said)
+    follow(motion, trail, 0, 0, said)
+    runs(said.run, said.fixed)
 
 
-def _loss() -> None:
+def _filter() -> None:
+    from surefix.filters.hypothesis_review import review
+    from surefix.filters.learning import supposed
+    from surefix.filters.rts import smooth
+    from surefix.robust.loss import loss_named
+
     _clean("igg3")
+    recovery, loss = Recovery(np.inf, 1.0, keeps_rate=True), loss_named("kalman")
+    for axes in (1, 2):
+        motion, epochs = _epochs(axes)
+        _, filtered, _ = filter_track(motion, loss, recovery, epochs, start(motion, recovery))
+        smoothed = smooth(motion, recovery, epochs.time, filtered)
+    prior, locked = supposed(2, 1.0, 1.0, 1.0, 39.5), np.zeros((_ROWS, 2), np.bool_)
+    review(motion, prior, epochs, np.ones_like(epochs.z), smoothed, locked)
+
+
+def _lag() -> None:
+    from surefix.filters.hypothesis_lag import filter_decided, not_followed, smooth_windows
+    from surefix.filters.hypothesis_trail import undecided
+
+    motion, epochs = _epochs(2)
+    said, kept = undecided(motion, _ROWS), not_followed(motion, _ROWS)
+    filter_decided(motion, 1.0, epochs, said, 0, _ROWS, kept)
+    last, wanted = np.minimum(np.arange(_ROWS) + 5, _ROWS - 1), np.ones(_ROWS, np.bool_)
+    mean, sigma = np.empty((2, _ROWS, 4))
+    smooth_windows(motion, epochs.time, said.jump, kept, last, wanted, 0, _ROWS, mean, sigma)
 
 
 def _cleaners() -> None:
-    for method in ("53h", "hampel", "median"):
-        _clean(method, modes=("offline",))
+    from surefix.filters.deciding import THRESHOLDS, Decider, decide
+
+    motion, epochs = _epochs(1)
+    for method, k0 in THRESHOLDS.items():
+        decide(Decider(method, k0), motion, Recovery(np.inf, 1.0, keeps_rate=True), epochs, {})
 
 
 def _sentences() -> None:
+    from surefix.io.nmea_scan import scan
+
     scan(b"$HEHDT,218.53,T*12\r\n")
 
 
-PARTS: dict[str, Callable[[], None]] = {
-    "hypotheses": _hypotheses,
-    "filter and smoother": _loss,
-    "sentences": _sentences,
-    "cleaners": _cleaners,
-}
-"""What can be compiled side by side, the longest first."""
+def _clean(method: str) -> None:
+    from surefix.io.table import from_frame
 
-
-def _clean(method: str, modes: tuple[Mode, ...] = _MODES) -> None:
     random = np.random.default_rng(1)
     time = np.arange(float(_ROWS))
     x, y, z = random.normal(0.0, 0.5, (3, _ROWS)) + 0.5 * time
     x[[9, 30, 31]] += 40.0
     frame = {"time": time, "x": x, "y": y, "z": z, "heading": time % 360.0}
-    for mode in modes:
+    for mode in _MODES:
         options = CleanOptions(mode=mode, method=method)
         clean_sources([Source(iter([from_frame(frame)]), "fixes", "log")], options)
+
+
+PARTS: dict[str, Part] = {
+    "hypotheses": Part(_hypotheses, "surefix.filters.multi_hypothesis", "_run"),
+    "filter and smoother": Part(_filter, "surefix.filters.track_step", "run"),
+    "cleaners": Part(_cleaners, "surefix.filters.median_step", "run"),
+    "sentences": Part(_sentences, "surefix.io.nmea_scan", "_scan"),
+    "fixed lag": Part(_lag, "surefix.filters.hypothesis_lag", "_smooth"),
+}
+"""By name, the longest first."""
