@@ -12,8 +12,10 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from io import BytesIO
 
 import numpy as np
+import pyarrow as pa
 
 from surefix.filters.hypotheses import no_hypotheses
 from surefix.filters.learning import supposed
@@ -22,6 +24,7 @@ from surefix.filters.records import Epochs, Motion
 from surefix.filters.track import by_axis
 from surefix.io.nmea_scan import scan
 from surefix.io.table import from_frame
+from surefix.io.write_csv import write_table
 from surefix.jit import compilations
 from surefix.pipelines.clean import Source, clean_sources
 from surefix.pipelines.options import CleanOptions, Mode
@@ -115,10 +118,15 @@ def _sentences() -> None:
     scan(b"$HEHDT,218.53,T*12\r\n")
 
 
+def _lines() -> None:
+    write_table(BytesIO(), pa.table({"x": [0.5], "verdict": ["used"]}), header=False)
+
+
 PARTS: dict[str, Callable[[], None]] = {
     "hypotheses": _hypotheses,
     "filter and smoother": _loss,
     "sentences": _sentences,
+    "lines of text": _lines,
     "cleaners": _cleaners,
 }
 """What can be compiled side by side, the longest first."""
