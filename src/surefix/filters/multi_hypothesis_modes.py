@@ -173,6 +173,24 @@ def decide_offline(
         As for the filter; at least one epoch.
     """
     recovery, n = _steady(prior), len(epochs.time)
+    said, locked = _in_both_directions(motion, prior, epochs)
+    for left in reversed(range(_SWEEPS)):
+        _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
+        smoothed = smooth(motion, recovery, epochs.time, filtered)
+        jump = needed_jumps(motion, epochs, said.jump, smoothed)
+        fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
+        if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
+            break
+        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
+        if left:
+            del filtered, smoothed  # their memory is for the next
+    return said, filtered, smoothed
+
+
+def _in_both_directions(
+    motion: Motion, prior: Prior, epochs: Epochs
+) -> tuple[Decisions, BoolArray]:
+    """What both directions agree on, and (n, 2) whose position, and whose velocity, stays out."""
     ahead, evidence = _decided(motion, prior, epochs)
     turned, reverse = _decided(motion, prior, backward(motion, epochs))
     back = Decisions(turned.fixed[::-1], turned.jump[::-1], turned.run[::-1])
@@ -182,16 +200,7 @@ def decide_offline(
     slips = ahead.fixed[:, d] == 0.0, back.fixed[:, d] == 0.0
     slipped = settle_velocities(motion, prior, epochs, *slips)
     said = Decisions(np.minimum(ahead.fixed, back.fixed), jump, ahead.run & back.run)
-    locked = np.column_stack([said.run > 0, slipped])
-    for _ in range(_SWEEPS):
-        _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
-        smoothed = smooth(motion, recovery, epochs.time, filtered)
-        jump = needed_jumps(motion, epochs, said.jump, smoothed)
-        fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
-        if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
-            break
-        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
-    return said, filtered, smoothed
+    return said, np.column_stack([said.run > 0, slipped])
 
 
 def _at_fixes(motion: Motion, epochs: Epochs, jump: IntArray, fixed: FloatArray) -> IntArray:
