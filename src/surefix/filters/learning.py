@@ -145,8 +145,8 @@ def learn(
     )
     for _ in range(_ROUNDS):
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
-        said, filtered, smoothed = decide_offline(motion, prior, epochs)
-        residual, _ = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        said, weight, smoothed = decide_offline(motion, prior, epochs)
+        residual, _ = deleted_residuals(motion, epochs, weight, smoothed)
         supposed_before, before = prior, figures
         prior = _counted(prior, said, residual, math.sqrt(float(np.median(epochs.variance))))
         figures = _likeliest(sample, said, prior, given, before, least, motion)

@@ -28,7 +28,6 @@ from surefix.filters.hypothesis_trail import (
 )
 from surefix.filters.modes import (
     from_filtered,
-    from_smoothed,
     rows_of,
 )
 from surefix.filters.multi_hypothesis import filter_hypotheses
@@ -154,37 +153,56 @@ def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate
     """
     if not len(epochs.time):
         return from_filtered(blank(motion, 0))
-    said, filtered, smoothed = decide_offline(motion, prior, epochs)
-    residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
-    standardised = residual / np.sqrt(variance)
-    whole = from_smoothed(smoothed, from_filtered(filtered))
-    whole = whole._replace(standardised=standardised, distance=np.abs(standardised))
+    said, weight, smoothed = decide_offline(motion, prior, epochs)
+    residual, variance = deleted_residuals(motion, epochs, weight, smoothed)
+    residual /= np.sqrt(variance)
+    whole = Estimate(
+        smoothed.mean,
+        np.sqrt(np.maximum(np.einsum("kii->ki", smoothed.covariance), 0.0)),
+        weight,
+        np.abs(residual),
+        residual,
+        said.jump,
+        np.full((len(weight), motion.groups), np.nan),
+        said.run,
+        np.full((len(weight), motion.axes), np.nan),
+        said.run == DRAGGED,
+        np.ones(len(weight)),
+    )
+    del smoothed, variance
     return _named(motion, epochs, said, whole)
 
 
 def decide_offline(
     motion: Motion, prior: Prior, epochs: Epochs
-) -> tuple[Decisions, Filtered, Smoothed]:
+) -> tuple[Decisions, FloatArray, Smoothed]:
     """Decide what belongs to the track by the whole series, and filter and smooth it.
 
     Parameters
     ----------
     motion, prior, epochs
         As for the filter; at least one epoch.
+
+    Returns
+    -------
+    said, weight, smoothed
+        The decisions, (n, m) with what weight each component was used, and the smoothed states.
     """
     recovery, n = _steady(prior), len(epochs.time)
     said, locked = _in_both_directions(motion, prior, epochs)
     for left in reversed(range(_SWEEPS)):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
-        smoothed = smooth(motion, recovery, epochs.time, filtered)
+        smoothed = smooth(motion, recovery, epochs.time, filtered, in_place=True)
+        weight = filtered.weight
+        del filtered
         jump = needed_jumps(motion, epochs, said.jump, smoothed)
         fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
         said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
         if left:
-            del filtered, smoothed  # their memory is for the next
-    return said, filtered, smoothed
+            del weight, smoothed  # their memory is for the next
+    return said, weight, smoothed
 
 
 def _in_both_directions(

@@ -42,7 +42,14 @@ class _Backward(NamedTuple):
     predicted: FloatArray
 
 
-def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered) -> Smoothed:
+def smooth(
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    filtered: Filtered,
+    *,
+    in_place: bool = False,
+) -> Smoothed:
     """Smooth a whole filtered series.
 
     Parameters
@@ -53,9 +60,12 @@ def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filte
         (n,) s, the epochs.
     filtered
         What the filter found; its jumps cut the series for the groups they concern.
+    in_place
+        Whether the smoothed states take the memory of those of the filter, which are then lost.
     """
     n, states = filtered.mean.shape
-    out, then = _room(n, states), _room(1, states)
+    out = Smoothed(filtered.mean, filtered.factor) if in_place else _room(n, states)
+    then = _room(1, states)
     for end in range(n, 0, -_BLOCK):
         here = slice(max(end - _BLOCK, 0), end)
         ahead = slice(here.start, end + 1)
