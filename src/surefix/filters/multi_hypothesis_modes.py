@@ -12,7 +12,6 @@ import numpy as np
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
 from surefix.filters.hypothesis_disputes import settle_velocities
 from surefix.filters.hypothesis_lag import (
-    Followed,
     filter_decided,
     not_followed,
     smooth_windows,
@@ -109,20 +108,21 @@ def lagged_hypotheses(
         filter_decided(motion, prior.sigma_velocity, epochs, said, first, head, kept)
         if head == n:
             smooth_windows(motion, time, said.jump, kept, last, wanted, done, n, mean, sigma)
-    return _named(motion, epochs, said, _lagged(motion, said, seen, kept, mean, sigma))
+    standardised = np.where(seen, kept.standardised, np.nan)
+    del trail, kept, last  # what is made now is as large
+    return _named(motion, epochs, said, _lagged(motion, said, seen, standardised, mean, sigma))
 
 
 def _lagged(
     motion: Motion,
     said: Decisions,
     seen: BoolArray,
-    kept: Followed,
+    standardised: FloatArray,
     mean: FloatArray,
     sigma: FloatArray,
 ) -> Estimate:
     """Read what was followed as an estimate, the jumps and runs not yet named."""
     n = len(mean)
-    standardised = np.where(seen, kept.standardised, np.nan)
     return Estimate(
         mean,
         sigma,
