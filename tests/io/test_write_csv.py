@@ -41,21 +41,24 @@ def test_unusual_cells() -> None:
     table = pa.table(
         {
             "x": pa.array([np.inf, -0.00001, None, np.nan, 1e300, -12.5]),
+            "single": pa.array([0.1, 1 / 3, None, 2.0, -1.5, 16.5], pa.float32()),
+            "huge": pa.array([1e308, 0.5, None, 1.0, 2.0, 3.0]),
             "row": pa.array([0, -(2**62), None, 10, 7, 100]),
             "many": pa.array([2**64 - 1, 1, 2, None, 4, 5], pa.uint64()),
             "right": pa.array([True, False, None, True, True, True]),
+            "large": pa.array(["a", "=b", None, "c", "d", "e"], pa.large_string()),
             "said": pa.array(['a "b"', "ü, °", None, "", "=1+1", "two\nlines"]),
             "none": pa.array([None] * 6, pa.string()),
         }
     )
     assert written(table).split("\n") == [
-        "x,row,many,right,said,none",
-        'inf,0,18446744073709551615,true,"a ""b""",',
-        '0,-4611686018427387904,1,false,"ü, °",',
-        ",,2,,,",
-        'nan,10,,true,"",',
-        '1e+300,7,4,true,"\'=1+1",',
-        '-12.5,100,5,true,"two lines",',
+        "x,single,huge,row,many,right,large,said,none",
+        'inf,0.1,1e+308,0,18446744073709551615,true,"a","a ""b""",',
+        '0,0.3333,0.5,-4611686018427387904,1,false,"\'=b","ü, °",',
+        ",,,,2,,,,",
+        ',2,1,10,,true,"c","",',
+        '1e+300,-1.5,2,7,4,true,"d","\'=1+1",',
+        '-12.5,16.5,3,100,5,true,"e","two lines",',
         "",
     ]
 

@@ -84,16 +84,19 @@ def _column(name: str, column: pa.ChunkedArray) -> _Column:
         return _Column(pc.fill_null(column.cast(pa.int64()), MISSING).to_numpy(), 0)
     if pa.types.is_timestamp(kind):
         return _words(pc.replace_substring(column.cast(pa.string()), " ", "T"), _quoted)
-    return _words(column, _quoted if pa.types.is_string(kind) else _plain)
+    text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    return _words(column.cast(pa.string()), _quoted) if text else _words(column, _plain)
 
 
 def _numbers(column: pa.ChunkedArray, decimals: int) -> _Column:
     """Numbers in units of their last decimal; as the library writes them, if one is too large."""
-    values = column.to_numpy()
-    scaled = np.rint(values * 10.0**decimals)
-    unknown = np.isnan(values)
-    if not (np.abs(scaled) < _EXACT)[~unknown].all():
-        return _words(pc.add(pc.round(column, decimals), 0.0), _plain)  # −0 becomes 0
+    values, unit = column.cast(pa.float64()).to_numpy(), 10.0**decimals
+    with np.errstate(over="ignore"):
+        scaled = np.rint(values * unit)
+    unknown, fits = np.isnan(values), np.abs(scaled) < _EXACT
+    if not (fits | unknown).all():
+        shown = np.where(fits, scaled / unit + 0.0, values)  # −0 becomes 0
+        return _words(pa.chunked_array([pa.array(shown, from_pandas=True)]), _plain)
     scaled[unknown] = 0.0
     cells = scaled.astype(np.int64)
     cells[unknown] = MISSING
