@@ -54,41 +54,48 @@ def vector(offset: Sequence[float]) -> str:
     return f"({', '.join(known)}) m" if len(offset) > 1 else ", ".join(known)
 
 
-def _text(
-    reason: int,
-    verdict: int,
-    weight: float,
-    sigma: float,
-    detail: float,
-    offset: Sequence[float],
-) -> str:
+def _sentences(reason: int, some: Verdicts) -> list[str]:
+    """Sentences of verdicts that all have one reason, not a fixed one."""
+    sigmas, detail = some.innovation_sigma.tolist(), some.detail.tolist()
     match reason:
-        case Reason.OFF if verdict == Verdict.REJECTED:
-            return f"{sigma:.1f} σ off"
         case Reason.OFF:
-            return f"{sigma:.1f} σ off, weight {weight:.2f}"
+            rejected = (some.verdict == Verdict.REJECTED).tolist()
+            return [
+                f"{sigma:.1f} σ off" if out else f"{sigma:.1f} σ off, weight {weight:.2f}"
+                for sigma, weight, out in zip(sigmas, some.weight.tolist(), rejected, strict=True)
+            ]
         case Reason.ISOLATED:
-            return f"isolated error, {sigma:.1f} σ off"
+            return [f"isolated error, {sigma:.1f} σ off" for sigma in sigmas]
         case Reason.AXIS_OFF:
-            return f"{sigma:.1f} σ off {_where(int(detail))}, the rest used"
-        case Reason.RUN:
-            known = any(math.isfinite(value) for value in offset)
-            by = f" with offset {vector(offset)}" if known else ""
-            return f"in a run of {int(detail)}{by}, {sigma:.1f} σ off"
-        case Reason.DRAG:
-            return (
-                f"in a drag of {int(detail)} fixes, offset now {vector(offset)}, {sigma:.1f} σ off"
-            )
+            where = zip(sigmas, detail, strict=True)
+            return [
+                f"{sigma:.1f} σ off {_where(int(mask))}, the rest used" for sigma, mask in where
+            ]
+        case Reason.RUN | Reason.DRAG:
+            lasting = zip(detail, some.offset.tolist(), sigmas, strict=True)
+            said = _run if reason == Reason.RUN else _drag
+            return [
+                f"{said(int(count), offset)}, {sigma:.1f} σ off" for count, offset, sigma in lasting
+            ]
         case Reason.JUMP:
-            return f"jump accepted, dated back to {clock(detail)}"
+            return [f"jump accepted, dated back to {clock(time)}" for time in detail]
         case Reason.REPEATED:
-            return f"the same record again, first at {clock(detail)}"
+            return [f"the same record again, first at {clock(time)}" for time in detail]
         case Reason.HELD:
-            return f"held: the fix of {clock(detail)} polled again"
+            return [f"held: the fix of {clock(time)} polled again" for time in detail]
         case Reason.LATE:
-            return f"arrived after the fix of {clock(detail)} was already out"
+            return [f"arrived after the fix of {clock(time)} was already out" for time in detail]
         case _:
-            return _FIXED[reason]
+            raise ValueError(reason)
+
+
+def _run(count: int, offset: Sequence[float]) -> str:
+    known = any(math.isfinite(value) for value in offset)
+    return f"in a run of {count}" + (f" with offset {vector(offset)}" if known else "")
+
+
+def _drag(count: int, offset: Sequence[float]) -> str:
+    return f"in a drag of {count} fixes, offset now {vector(offset)}"
 
 
 def texts(verdicts: Verdicts) -> list[str]:
@@ -98,16 +105,6 @@ def texts(verdicts: Verdicts) -> list[str]:
         rows = np.flatnonzero(verdicts.reason == reason)
         if reason in _FIXED:
             found[rows] = _FIXED[reason]
-            continue
-        found[rows] = [
-            _text(reason, *row)
-            for row in zip(
-                verdicts.verdict[rows].tolist(),
-                verdicts.weight[rows].tolist(),
-                verdicts.innovation_sigma[rows].tolist(),
-                verdicts.detail[rows].tolist(),
-                verdicts.offset[rows].tolist(),
-                strict=True,
-            )
-        ]
+        else:
+            found[rows] = _sentences(reason, Verdicts._make(column[rows] for column in verdicts))
     return found.tolist()

@@ -141,8 +141,8 @@ def learn(
     noisy = None
     for _ in range(_ROUNDS):
         motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
-        said, filtered, smoothed = decide_offline(motion, prior, epochs)
-        residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
+        said, weight, smoothed = decide_offline(motion, prior, epochs)
+        residual, variance = deleted_residuals(motion, epochs, weight, smoothed)
         supposed_before, before = prior, figures
         prior = counted(prior, said, residual, variance, epochs.variance)
         figures = _likeliest(sample, said, prior, given, before, least, motion)

@@ -12,7 +12,6 @@ import numpy as np
 from surefix.filters.hypotheses import MOST, Bank, Prior, no_hypotheses
 from surefix.filters.hypothesis_disputes import settle_fixes, settle_velocities
 from surefix.filters.hypothesis_lag import (
-    Followed,
     filter_decided,
     not_followed,
     smooth_windows,
@@ -28,7 +27,6 @@ from surefix.filters.hypothesis_trail import (
 )
 from surefix.filters.modes import (
     from_filtered,
-    from_smoothed,
     rows_of,
 )
 from surefix.filters.multi_hypothesis import filter_hypotheses
@@ -110,20 +108,21 @@ def lagged_hypotheses(
         filter_decided(motion, prior.sigma_velocity, epochs, said, first, head, kept)
         if head == n:
             smooth_windows(motion, time, said.jump, kept, last, wanted, done, n, mean, sigma)
-    return _named(motion, epochs, said, _lagged(motion, said, seen, kept, mean, sigma))
+    standardised = np.where(seen, kept.standardised, np.nan)
+    del trail, kept, last  # what is made now is as large
+    return _named(motion, epochs, said, _lagged(motion, said, seen, standardised, mean, sigma))
 
 
 def _lagged(
     motion: Motion,
     said: Decisions,
     seen: BoolArray,
-    kept: Followed,
+    standardised: FloatArray,
     mean: FloatArray,
     sigma: FloatArray,
 ) -> Estimate:
     """Read what was followed as an estimate, the jumps and runs not yet named."""
     n = len(mean)
-    standardised = np.where(seen, kept.standardised, np.nan)
     return Estimate(
         mean,
         sigma,
@@ -154,25 +153,65 @@ def offline_hypotheses(motion: Motion, prior: Prior, epochs: Epochs) -> Estimate
     """
     if not len(epochs.time):
         return from_filtered(blank(motion, 0))
-    said, filtered, smoothed = decide_offline(motion, prior, epochs)
-    residual, variance = deleted_residuals(motion, epochs, filtered.weight, smoothed)
-    standardised = residual / np.sqrt(variance)
-    whole = from_smoothed(smoothed, from_filtered(filtered))
-    whole = whole._replace(standardised=standardised, distance=np.abs(standardised))
+    said, weight, smoothed = decide_offline(motion, prior, epochs)
+    residual, variance = deleted_residuals(motion, epochs, weight, smoothed)
+    residual /= np.sqrt(variance)
+    whole = Estimate(
+        smoothed.mean,
+        np.sqrt(np.maximum(np.einsum("kii->ki", smoothed.covariance), 0.0)),
+        weight,
+        np.abs(residual),
+        residual,
+        said.jump,
+        np.full((len(weight), motion.groups), np.nan),
+        said.run,
+        np.full((len(weight), motion.axes), np.nan),
+        said.run == DRAGGED,
+        np.ones(len(weight)),
+    )
+    del smoothed, variance
     return _named(motion, epochs, said, whole)
 
 
 def decide_offline(
     motion: Motion, prior: Prior, epochs: Epochs
-) -> tuple[Decisions, Filtered, Smoothed]:
+) -> tuple[Decisions, FloatArray, Smoothed]:
     """Decide what belongs to the track by the whole series, and filter and smooth it.
 
     Parameters
     ----------
     motion, prior, epochs
         As for the filter; at least one epoch.
+
+    Returns
+    -------
+    said, weight, smoothed
+        The decisions, (n, m) with what weight each component was used, and the smoothed states.
     """
     recovery, n = _steady(prior), len(epochs.time)
+    said, locked = _in_both_directions(motion, prior, epochs)
+    for left in reversed(range(_SWEEPS)):
+        _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
+        smoothed = smooth(motion, recovery, epochs.time, filtered, in_place=True)
+        weight = filtered.weight
+        del filtered
+        jump = needed_jumps(motion, epochs, said.jump, smoothed)
+        fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
+        amid = settle_fixes(motion, prior, epochs, said._replace(fixed=fixed, jump=jump), recovery)
+        fixed[amid, : motion.axes] = 0.0
+        locked[:, 0] |= amid
+        if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
+            break
+        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
+        if left:
+            del weight, smoothed  # their memory is for the next
+    return said, weight, smoothed
+
+
+def _in_both_directions(
+    motion: Motion, prior: Prior, epochs: Epochs
+) -> tuple[Decisions, BoolArray]:
+    """What both directions agree on, and (n, 2) whose position, and whose velocity, stays out."""
     ahead, evidence = _decided(motion, prior, epochs)
     turned, reverse = _decided(motion, prior, backward(motion, epochs))
     back = Decisions(turned.fixed[::-1], turned.jump[::-1], turned.run[::-1])
@@ -182,19 +221,7 @@ def decide_offline(
     slips = ahead.fixed[:, d] == 0.0, back.fixed[:, d] == 0.0
     slipped = settle_velocities(motion, prior, epochs, *slips)
     said = Decisions(np.minimum(ahead.fixed, back.fixed), jump, ahead.run & back.run)
-    locked = np.column_stack([said.run > 0, slipped])
-    for _ in range(_SWEEPS):
-        _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
-        smoothed = smooth(motion, recovery, epochs.time, filtered)
-        jump = needed_jumps(motion, epochs, said.jump, smoothed)
-        fixed = review(motion, prior, epochs, said.fixed, smoothed, locked)
-        amid = settle_fixes(motion, prior, epochs, said._replace(fixed=fixed, jump=jump), recovery)
-        fixed[amid, :d] = 0.0
-        locked[:, 0] |= amid
-        if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
-            break
-        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
-    return said, filtered, smoothed
+    return said, np.column_stack([said.run > 0, slipped])
 
 
 def _at_fixes(motion: Motion, epochs: Epochs, jump: IntArray, fixed: FloatArray) -> IntArray:

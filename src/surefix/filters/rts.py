@@ -21,6 +21,8 @@ from surefix.types import FloatArray, IntArray
 
 __all__ = ["Smoothed", "leave_one_out", "smooth", "smooth_lag"]
 
+_BLOCK = 4096  # epochs of which more than the smoothed states is kept at one time
+
 
 class Smoothed(NamedTuple):
     """Smoothed states: ``mean`` (n, states) and ``covariance`` (n, states, states)."""
@@ -40,7 +42,14 @@ class _Backward(NamedTuple):
     predicted: FloatArray
 
 
-def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filtered) -> Smoothed:
+def smooth(
+    motion: Motion,
+    recovery: Recovery,
+    time: FloatArray,
+    filtered: Filtered,
+    *,
+    in_place: bool = False,
+) -> Smoothed:
     """Smooth a whole filtered series.
 
     Parameters
@@ -51,13 +60,30 @@ def smooth(motion: Motion, recovery: Recovery, time: FloatArray, filtered: Filte
         (n,) s, the epochs.
     filtered
         What the filter found; its jumps cut the series for the groups they concern.
+    in_place
+        Whether the smoothed states take the memory of those of the filter, which are then lost.
     """
     n, states = filtered.mean.shape
-    out = Smoothed(np.empty((n, states)), np.empty((n, states, states)))
-    if n:
-        back = _backward(motion, recovery, time, filtered)
-        _smooth(filtered, back, np.arange(n), np.full(n, n - 1), True, out, size_of(states))
+    out = Smoothed(filtered.mean, filtered.factor) if in_place else _room(n, states)
+    then = _room(1, states)
+    for end in range(n, 0, -_BLOCK):
+        here = slice(max(end - _BLOCK, 0), end)
+        ahead = slice(here.start, end + 1)
+        back = _backward(motion, recovery, time[ahead], _rows(filtered, ahead))
+        found = Smoothed(out.mean[here], out.covariance[here])
+        last = np.full(len(found.mean), len(found.mean) - 1)
+        _smooth(
+            _rows(filtered, here), back, last, last, True, end < n, then, found, size_of(states)
+        )
     return out
+
+
+def _room(n: int, states: int) -> Smoothed:
+    return Smoothed(np.empty((n, states)), np.empty((n, states, states)))
+
+
+def _rows(filtered: Filtered, some: slice) -> Filtered:
+    return Filtered._make(column[some] for column in filtered)
 
 
 def smooth_lag(
@@ -80,10 +106,10 @@ def smooth_lag(
         (k,) the last epoch that counts for each of them.
     """
     states = filtered.mean.shape[1]
-    out = Smoothed(np.empty((len(last), states)), np.empty((len(last), states, states)))
+    out = _room(len(last), states)
     if len(last):
-        back = _backward(motion, recovery, time, filtered)
-        _smooth(filtered, back, rows, last, False, out, size_of(states))
+        back, none = _backward(motion, recovery, time, filtered), _room(1, states)
+        _smooth(filtered, back, rows, last, False, False, none, out, size_of(states))
     return out
 
 
@@ -92,7 +118,7 @@ def _backward(
 ) -> _Backward:
     n, states = filtered.mean.shape
     back = _Backward(
-        np.zeros((n, states, states)), np.zeros((n, states, states)), np.zeros((n, states))
+        np.empty((n, states, states)), np.empty((n, states, states)), np.empty((n, states))
     )
     _reduce(motion, recovery, time, filtered, back, size_of(states), size_of(2 * states))
     return back
@@ -198,15 +224,25 @@ def _smooth(
     rows: IntArray,
     last: IntArray,
     whole: bool,
+    goes_on: bool,
+    then: Smoothed,
     out: Smoothed,
     states: Size,
 ) -> None:
-    """Smooth epoch ``rows[i]`` with the data up to ``last[i]``; all in one sweep if ``whole``."""
+    """Smooth epoch ``rows[i]`` with the data up to ``last[i]``; all in one sweep if ``whole``.
+
+    ``then`` is the state where that sweep ends, and, if it ``goes_on``, from where it comes.
+    """
     epochs, n = out.mean.shape[0], width(states)
     x, y = scratch(ONE, states), scratch(ONE, states)
     P, W = scratch(states, states), scratch(states, states)
+    x_then, P_then = part(then.mean, 0, ONE, states), part(then.covariance, 0, states, states)
+    if goes_on:
+        copy_row(x, 0, x_then, 0, states)
+        for i in range(n):
+            copy_row(P, i, P_then, i, states)
     for k in range(epochs - 1, -1, -1):
-        if whole and k < epochs - 1:
+        if whole and (goes_on or k < epochs - 1):
             _step_back(k, filtered, back, x, P, W, y, states)
         else:
             _begin(last[k], filtered, x, P, W, states)
@@ -218,6 +254,9 @@ def _smooth(
             copy_row(found, i, P, i, states)
             for j in range(i):
                 found[j, i] = found[i, j]
+    copy_row(x_then, 0, x, 0, states)
+    for i in range(n):
+        copy_row(P_then, i, P, i, states)
 
 
 def leave_one_out(

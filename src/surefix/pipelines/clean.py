@@ -62,5 +62,7 @@ def clean_batches(
     session = begin_session([(source.name, source.role) for source in inputs], options, estimator)
     while not session.merging.ended:
         source = session.merging.behind
-        session, batches = advance(session, source, next(inputs[source].logs, None))
+        log, last = next(inputs[source].logs, None), [session]
+        del session  # what waits in it is not held on to while it is cleaned
+        session, batches = advance(last.pop(), source, log)
         yield from batches

@@ -46,8 +46,9 @@ def clean_rows(session: Session, rows: Rows) -> tuple[Session, Cleaned]:
     first = session if session.repeats is not None else begin_rows(session, rows)
     assert first.repeats is not None
     fixes = rows.fixes
-    recorded = np.hstack([fixes.position, fixes.velocity])
-    repeats, known = find_repeats(rows.tau, recorded, fixes.sensor, first.repeats)
+    repeats, known = find_repeats(
+        rows.tau, np.hstack([fixes.position, fixes.velocity]), fixes.sensor, first.repeats
+    )
     tau = steady(rows.tau, session.last_tau)
     status = status_of(rows, repeats, held=session.options.held)
     used = _without_idle(first, rows)
@@ -98,19 +99,24 @@ def _clean(
     session, found, changes = _estimated(session, setup, all_rows)
     judged = _judged(setup, all_rows, found)
     track = _track(setup, all_rows, found)
-    row = np.flatnonzero(order < len(tau))
+    auxiliary, scale = all_rows.auxiliary, 1.0 if found is None else found.scale
+    del epochs, all_rows, found  # what is made now is as large
+    own = order < len(tau)
+    row = _where(own)
+    input_row = order[row] if len(grid) else row
     health_events, health = sensor_events(
         Verdicts._make(column[row] for column in judged),
         track.time[row],
-        rows.fixes.sensor[order[row]],
+        rows.fixes.sensor[input_row],
         list(sensors),
-        np.ones(len(row)) if found is None else found.scale[row],
-        all_rows.auxiliary[row],
+        np.broadcast_to(scale, order.shape)[row],
+        auxiliary[row],
         session.health,
     )
 
-    fix = np.flatnonzero((order < len(tau)) & ~all_rows.auxiliary)
-    mine = take_rows(rows, order[fix])
+    fix = _where(own & ~auxiliary)
+    input_fix = order[fix] if len(grid) else fix
+    mine = take_rows(rows, input_fix)
     judged = Verdicts._make(column[fix] for column in judged)
     told = judged, track.time[fix], mine.fixes.sensor, list(sensors)
     session = replace(
@@ -120,11 +126,11 @@ def _clean(
         nothing(sensors, options, setup),
         track=pick(track, fix),
         verdicts=judged,
-        raw_position=position[order[fix]] + setup.origin,
+        raw_position=position[input_fix] + setup.origin,
         raw_coordinates=mine.fixes.position,
         sensor=mine.fixes.sensor,
         row=mine.fixes.row,
-        resampled=pick(track, np.flatnonzero(order >= len(tau))) if options.every_s else None,
+        resampled=pick(track, np.flatnonzero(~own)) if options.every_s else None,
         events=(
             *jump_events(judged),
             *run_events(*told, growing=options.mode == "realtime"),
@@ -133,6 +139,11 @@ def _clean(
         ),
         settings=settings(options, setup),
     )
+
+
+def _where(mask: BoolArray) -> IntArray | slice:
+    """Where a mask holds; everywhere is a slice, which copies nothing."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
 def _estimated(

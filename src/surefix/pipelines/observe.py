@@ -128,9 +128,10 @@ def epochs_of(
         fixed = np.vstack([fixed, np.full((len(grid), motion.groups), np.nan)])
     order = np.argsort(tau, kind="stable") if len(grid) else np.arange(n)
     jump = np.zeros(len(order), np.int64)
-    sensor = np.concatenate([rows.fixes.sensor, np.zeros(len(grid), np.int64)])[order]
+    sensor = np.concatenate([rows.fixes.sensor, np.zeros(len(grid), np.int64)])
     sensor = np.minimum(sensor, MOST_SENSORS - 1)
-    return order, Epochs(tau[order], z[order], sigma[order] ** 2, fixed[order], jump, sensor)
+    at = order if len(grid) else slice(None)  # which copies nothing
+    return order, Epochs(tau[at], z[at], sigma[at] ** 2, fixed[at], jump, sensor[at])
 
 
 def _sigma(declared: FloatArray, figures: FloatArray, sensors: int, sensor: IntArray) -> FloatArray:

@@ -51,7 +51,7 @@ def track_of(setup: Setup, found: Estimate | None, time: FloatArray) -> Track:
     return Track(time, position + setup.origin, velocity, sigma_position, sigma_velocity, geodetic)
 
 
-def pick(track: Track, index: IntArray) -> Track:
+def pick(track: Track, index: IntArray | slice) -> Track:
     """Pick epochs of a track."""
     return Track._make(None if column is None else column[index] for column in track)
 

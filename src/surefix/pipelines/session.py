@@ -87,7 +87,10 @@ def advance(session: Session, source: int, log: Log | None) -> tuple[Session, tu
         session.setup is not None or session.channels
     ):
         raise _nothing_found(session)
-    return _batches(replace(session, waiting=()), waiting, final=merging.ended)
+    session = replace(session, waiting=())
+    chunks, rows = _rows_of(waiting)
+    del waiting, chunk  # their rows are there once more
+    return _batches(session, rows, chunks, final=merging.ended)
 
 
 def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Session, tuple[Cleaned, ...]]:
@@ -116,7 +119,8 @@ def end_on_trial(session: Session, logs: Sequence[Log]) -> tuple[Session, tuple[
                 waiting.append(chunk)
     begun = {key: parts for key, parts in session.arrived.items() if key in session.channels}
     session = replace(session, merging=merging, waiting=(), arrived=begun)
-    return _batches(session, waiting, final=True, begins=False)
+    chunks, rows = _rows_of(waiting)
+    return _batches(session, rows, chunks, final=True, begins=False)
 
 
 def _nothing_found(session: Session) -> InputError:
@@ -131,12 +135,22 @@ def _nothing_found(session: Session) -> InputError:
     )
 
 
+def _rows_of(waiting: Sequence[Chunk]) -> tuple[list[Chunk], Rows | None]:
+    """Take the rows out of what was read, and put them one after the other."""
+    parts = [chunk.rows for chunk in waiting if chunk.rows is not None]
+    rows = join_rows(parts) if parts else None
+    return [chunk._replace(rows=None) for chunk in waiting], rows
+
+
 def _batches(
-    session: Session, chunks: Sequence[Chunk], *, final: bool, begins: bool = True
+    session: Session,
+    rows: Rows | None,
+    chunks: Sequence[Chunk],
+    *,
+    final: bool,
+    begins: bool = True,
 ) -> tuple[Session, tuple[Cleaned, ...]]:
     """Clean what was read, in real time in portions of bounded size."""
-    parts = [chunk.rows for chunk in chunks if chunk.rows is not None]
-    rows = join_rows(parts) if parts else None
     portions: list[Rows | None] = [rows]
     size = max(_PORTION, session.options.settle_rows)
     if session.options.mode == "realtime" and rows is not None and len(rows.tau) > size:

@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from io import BytesIO
 from typing import NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.track import by_axis, filter_track, start
@@ -149,6 +151,12 @@ def _sentences() -> None:
     scan(b"$HEHDT,218.53,T*12\r\n")
 
 
+def _lines() -> None:
+    from surefix.io.write_csv import write_table
+
+    write_table(BytesIO(), pa.table({"x": [0.5], "verdict": ["used"]}), header=False)
+
+
 def _clean(method: str) -> None:
     from surefix.io.table import from_frame
 
@@ -168,5 +176,6 @@ PARTS: dict[str, Part] = {
     "cleaners": Part(_cleaners, "surefix.filters.median_step", "run"),
     "sentences": Part(_sentences, "surefix.io.nmea_scan", "_scan"),
     "fixed lag": Part(_lag, "surefix.filters.hypothesis_lag", "_smooth"),
+    "lines of text": Part(_lines, "surefix.io.print_rows", "print_rows"),
 }
 """By name, the longest first."""
