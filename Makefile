@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 SPARK := $(VENV)/.spark
 CANDIDATES := $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
-KERNELS := build/kernels
+KERNELS := $(CURDIR)/build/kernels
 BENCH := .venv-bench
 
 # Spark takes half a gigabyte and is only needed for its tests: it has a lock of its own.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import ipaddress
 import math
 import os
@@ -157,12 +156,17 @@ async def _clients(line: Line, listed: _Listed, arrived: Callable[[bytes], None]
         elif listed(host):
             inside += 1
             line.connected = True
-            with contextlib.suppress(OSError):
+            try:
                 while data := await reader.read(_BLOCK):
                     arrived(data)
-            inside -= 1
-            line.connected = inside > 0
-        writer.close()
+            except OSError:
+                pass
+            finally:
+                inside -= 1
+                line.connected = inside > 0
+                writer.close()
+        else:
+            writer.close()
 
     try:
         server = await asyncio.start_server(client, line.address.host, line.address.port)

@@ -107,7 +107,7 @@ class InputOptions:
 
     def _check_roles(self) -> None:
         given = self.role if isinstance(self.role, tuple) else (self.role,)
-        if not given or len(set(given)) < len(given) or not set(given) <= {*ROLES}:
+        if not given or any(given.count(each) > 1 or each not in ROLES for each in given):
             raise OptionsError(
                 f"role {self.role!r} of {self.name}", "one or several of " + ", ".join(ROLES)
             )
