@@ -93,7 +93,7 @@ def begin(folder: Path, port: int, boat: Iterator[bytes]) -> None:
     """Send until a position has been told."""
     journal = open_journal(read_live(folder / "live.toml").journal, new=False)
     end = time.monotonic() + 60.0
-    while journal.last()[1] == 0:
+    while not journal.newest("nmea", 1):
         assert time.monotonic() < end, "no position is told"
         send(port, islice(boat, 10))
     journal.close()

@@ -385,9 +385,8 @@ class NmeaStream:
             self._samples_of(record, heading_magnetic_deg=record.magnetic)
 
     def _along_speed(self, record: AlongSpeed) -> None:
-        self._samples_of(
-            record, water_speed_along_mps=record.water, ground_speed_along_mps=record.ground
-        )
+        water, ground = record.water, record.ground
+        self._samples_of(record, water_speed_along_mps=water, ground_speed_along_mps=ground)
 
     def _depth(self, record: Depth) -> None:
         self._samples_of(record, depth_m=record.depth)

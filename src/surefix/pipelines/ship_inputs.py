@@ -26,6 +26,7 @@ _QUANTITIES = {
     "water_speed_along_mps": "speed",
     "depth_m": "depth",
 }
+_ATTITUDE = ("PASHR", "PSXN", "PHTRO")
 _Parts = dict[tuple[str, str], list[tuple[FloatArray, FloatArray, BoolArray]]]
 
 
@@ -33,7 +34,8 @@ def streams_of(paths: Sequence[str | Path]) -> tuple[Stream, ...]:
     """Read the positions, speeds, headings and depths of logs, in the order of time.
 
     Each series gets its own clock repaired; records that came twice, without a time or too late
-    are left out, and so are series of fewer than `LEAST` samples.
+    are left out, and so are series of fewer than `LEAST` samples, and headings beside roll and pitch
+    where the same log has them in a sentence of their own.
 
     Parameters
     ----------
@@ -50,6 +52,8 @@ def streams_of(paths: Sequence[str | Path]) -> tuple[Stream, ...]:
         _read(open_log(path), parts)
     streams = []
     for (sensor, quantity), found in parts.items():
+        if quantity == "heading" and _once_more(sensor, parts):
+            continue
         time, value, valid = (np.concatenate([part[i] for part in found]) for i in range(3))
         stream = _in_order(Stream(sensor, quantity, time, value, valid))
         if np.isfinite(stream.value).sum() >= LEAST:
@@ -74,6 +78,15 @@ def _read(logs: Iterable[Log], parts: _Parts) -> None:
                 valid = np.ones(len(value), np.bool_)
                 key = channel.sensor, _QUANTITIES[channel.name]
                 parts.setdefault(key, []).append((channel.time, value, valid))
+
+
+def _once_more(sensor: str, parts: _Parts) -> bool:
+    """Whether a heading beside roll and pitch is that of a sentence of its own in the same log."""
+    log, _, sentence = sensor.rpartition(" ")
+    if sentence not in _ATTITUDE:
+        return False
+    others = (other.rpartition(" ") for other, quantity in parts if quantity == "heading")
+    return any(each == log and own not in _ATTITUDE for each, _, own in others)
 
 
 def _in_order(stream: Stream) -> Stream:

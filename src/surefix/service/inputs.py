@@ -173,7 +173,10 @@ async def _clients(line: Line, listed: _Listed, arrived: Callable[[bytes], None]
     except OSError as error:
         raise _taken(line.address, error) from error
     async with server:
-        await server.serve_forever()
+        try:
+            await server.serve_forever()
+        finally:
+            await asyncio.sleep(0.0)  # who is just coming in is met, and so will be closed
 
 
 def _taken(address: Address, error: OSError) -> InputError:

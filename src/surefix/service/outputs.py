@@ -124,6 +124,7 @@ class _Server:
     async def close(self) -> None:
         assert self._server is not None
         self._server.close()
+        await asyncio.sleep(0.0)  # who is just coming in is met, and so will be closed
         for writer in tuple(self._clients):
             writer.close()
         waits = [asyncio.create_task(_closed(writer)) for writer in self._clients]
