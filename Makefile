@@ -35,6 +35,7 @@ demo: $(INSTALLED)
 # Kernels are compiled afresh: a cached caller can outlive the kernel it calls.
 test: lint $(SPARK)
 	rm -rf $(KERNELS)
+	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/surefix warmup
 	NUMBA_CACHE_DIR=$(KERNELS) $(BIN)/python -m pytest -n 2 --dist loadgroup
 
 lint: $(INSTALLED)

@@ -34,8 +34,8 @@ def streams_of(paths: Sequence[str | Path]) -> tuple[Stream, ...]:
     """Read the positions, speeds, headings and depths of logs, in the order of time.
 
     Each series gets its own clock repaired; records that came twice, without a time or too late
-    are left out, and so are series of fewer than `LEAST` samples, and headings beside roll and pitch
-    where the same log has them in a sentence of their own.
+    are left out, and so are series of fewer than `LEAST` samples, and headings beside roll and
+    pitch where the same log has them in a sentence of their own.
 
     Parameters
     ----------
