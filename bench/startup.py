@@ -48,6 +48,9 @@ def _rows(folder: Path, cold: bool) -> Iterator[dict[str, str]]:
         kernels = environment | {"NUMBA_CACHE_DIR": str(folder / "kernels")}
         yield _row("warmup, nothing compiled before", [_run(["warmup"], kernels)])
         yield _row("warmup again", [_run(["warmup"], kernels)])
+        first = environment | {"NUMBA_CACHE_DIR": str(folder / "first")}
+        words = ["clean", str(log), "-o", str(out)]
+        yield _row("clean 1,000 fixes, nothing compiled before", [_run(words, first)])
     commands = {
         "--help": ["--help"],
         "clean 1,000 fixes": ["clean", str(log), "-o", str(out)],
