@@ -174,14 +174,19 @@ def test_fault_41_a_source_that_is_away_costs_nothing_and_comes_back():
         share = (time.process_time() - spent) / (time.monotonic() - began)
         assert "refused" in line.trouble.lower()
 
+        met = []
+
         async def greet(_, writer):
+            met.append(writer)
             writer.write(SENTENCE)
             await writer.drain()
 
         async with await asyncio.start_server(greet, "127.0.0.1", port):
             await wait_for(lambda: line.connected, 30.0)
             await wait_for(lambda: line.size == len(SENTENCE), 30.0)
-        task.cancel()
+            task.cancel()
+            for writer in met:
+                writer.close()
         return share
 
     assert asyncio.run(run()) < 0.05
