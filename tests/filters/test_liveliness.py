@@ -11,6 +11,7 @@ from surefix.filters.learning import supposed
 from surefix.filters.liveliness import begin_lively, follow
 from surefix.filters.multi_hypothesis_modes import realtime_hypotheses, rows_of
 from surefix.filters.records import Epochs
+from surefix.jit import compilations
 
 REST = 200  # epochs at rest before a vehicle gets under way
 
@@ -144,3 +145,16 @@ def test_parts_give_the_same_as_the_whole(seed):
         for one, other in zip(after, lively, strict=True):
             if isinstance(one, np.ndarray):
                 np.testing.assert_array_equal(one, other)
+
+
+def test_a_look_compiles_nothing_that_the_filter_did_not():
+    """A live stream does not wait for the compiler, nor does one whose columns lie apart."""
+    _, epochs, motion = sailing(1, axes=3)
+    filtered(rows_of(epochs, 0, 10), motion)
+    told = []
+    with compilations(told.append):
+        _, changes, _ = filtered(epochs, motion, blocks=[(0, 1), (2,)])
+        filtered(rows_of(epochs, 0, 10)._replace(z=np.asfortranarray(epochs.z[:10])), motion)
+    assert changes
+    assert all(type(each.process) is float for each in changes)
+    assert told == []

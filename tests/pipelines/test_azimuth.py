@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from surefix.pipelines.azimuth import Headings, azimuth_at, settled
+from surefix.pipelines.azimuth import azimuth_at, settled
+from surefix.pipelines.turning import Angles
 
 
 def course(time):
@@ -14,7 +15,7 @@ def course(time):
 def known(time, wild=()):
     heading = course(time) % (2.0 * np.pi)
     heading[list(wild)] = (heading[list(wild)] + 1.5) % (2.0 * np.pi)
-    return Headings(np.asarray(time, dtype=float), heading)
+    return Angles(np.asarray(time, dtype=float), heading)
 
 
 def off(turning, time):
@@ -43,7 +44,7 @@ def test_a_gap_is_bridged_for_two_seconds_or_where_both_ends_are_near():
     assert lost.tolist() == [True, False, False, True, True, False, False, True]
     near = known(np.concatenate([np.arange(0.0, 20.0, 0.2), np.arange(29.7, 50.0, 0.2)]))
     assert np.isfinite(azimuth_at(near, np.arange(20.0, 29.0))).all()
-    assert np.isnan(azimuth_at(Headings(), np.array([1.0]))).all()
+    assert np.isnan(azimuth_at(Angles(), np.array([1.0]))).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -53,6 +54,6 @@ def test_what_is_settled_stays(seed):
     time = np.cumsum(rng.choice([0.1, 0.3, 1.0, 12.0], 200, p=[0.5, 0.3, 0.15, 0.05]))
     whole = known(time)
     for n in (17, 60, 150):
-        part = Headings(time[:n], whole.heading[:n])
+        part = Angles(time[:n], whole.angle[:n])
         times = np.linspace(time[0], settled(part), 50)
         np.testing.assert_array_equal(azimuth_at(part, times), azimuth_at(whole, times))

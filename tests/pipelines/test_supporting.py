@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from surefix.pipelines.azimuth import Headings
 from surefix.pipelines.rows import Rows
 from surefix.pipelines.supporting import BODY, steered, support
+from surefix.pipelines.turning import Angles
 from surefix.types import Channel, Fixes, Log
 
 TIME = np.arange(5.0)
@@ -46,7 +46,7 @@ def test_positions_are_not_taken_from_a_log_of_velocities(own, rows):
 def test_turned_by_the_heading_with_its_uncertainty(degrees):
     """Ahead at 2 m/s: one degree is 35 mm/s across, and nothing along."""
     time = np.arange(0.0, 10.0, 0.5)
-    turning = Headings(time, np.full(len(time), np.radians(degrees)))
+    turning = Angles(time, np.full(len(time), np.radians(degrees)))
     ahead = fixes(np.full((5, 3), np.nan), np.tile([0.0, 2.0, 0.1], (5, 1)))
     ahead = ahead._replace(sigma_velocity=np.full((5, 3), 0.01), time=TIME + 2.0)
     no = np.zeros(5, np.bool_)
@@ -59,6 +59,6 @@ def test_turned_by_the_heading_with_its_uncertainty(degrees):
     wide = np.append(np.hypot(0.01, across), 0.01)
     np.testing.assert_allclose(done.fixes.sigma_velocity, np.tile(wide, (5, 1)), atol=1e-12)
     assert problems == ()
-    lost, problems = steered(rows, Headings(), 0.01, "dvl")
+    lost, problems = steered(rows, Angles(), 0.01, "dvl")
     assert np.isnan(lost.fixes.velocity[:, :2]).all()
     assert [(each.kind, each.total) for each in problems] == [("no-heading", 5)]

@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import Prior, no_hypotheses
+from surefix.filters.hypotheses import Prior
 from surefix.filters.hypothesis_branches import ROW
 from surefix.filters.hypothesis_density import log_wild
+from surefix.filters.hypothesis_evidence import evidence
 from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.modes import rows_of
-from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.records import Epochs, Motion, Recovery
 from surefix.filters.rts import smooth
 from surefix.filters.track import filter_track, start
@@ -27,7 +27,6 @@ from surefix.types import BoolArray, IntArray
 __all__ = ["settle_fixes", "settle_velocities"]
 
 _FEWEST = 2  # on end; a single one is judged by the others
-_BRIEFLY = 16  # hypotheses kept
 
 
 def settle_velocities(
@@ -58,12 +57,12 @@ def settle_velocities(
             rows = mine[first:end]
             if end - first < _FEWEST:
                 continue
-            wrong, good = (_evidence(motion, prior, epochs, out, rows, w) for w in (0.0, 1.0))
+            wrong, good = (_likely(motion, prior, epochs, out, rows, w) for w in (0.0, 1.0))
             out[rows] = wrong > good
     return out
 
 
-def _evidence(
+def _likely(
     motion: Motion, prior: Prior, epochs: Epochs, out: BoolArray, rows: IntArray, weight: float
 ) -> float:
     """Log-likelihood of what was observed about some velocities if they have a weight, 0 or 1."""
@@ -76,9 +75,7 @@ def _evidence(
     free = np.isnan(fixed[:, motion.axes :])
     fixed[:, motion.axes :] = np.where(free, said[:, None], fixed[:, motion.axes :])
     part = rows_of(epochs, first, until)._replace(fixed=fixed)
-    bank = no_hypotheses(motion, _BRIEFLY)
-    _, found, _ = filter_hypotheses(motion, prior, part, bank, traced=False)
-    return float(found.evidence.sum())
+    return evidence(motion, prior, part)
 
 
 def settle_fixes(

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surefix.filters.hypotheses import Prior, no_hypotheses
+from surefix.filters.hypotheses import Prior
+from surefix.filters.hypothesis_evidence import BEGIN, BRIEFLY, evidence
 from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.learning_shares import counted
-from surefix.filters.multi_hypothesis import filter_hypotheses
 from surefix.filters.multi_hypothesis_modes import decide_offline
 from surefix.filters.noise import NoiseFigures, Observations, initial_scales, sample_of, variances
 from surefix.filters.records import Epochs, Motion
@@ -36,12 +36,10 @@ _SHRINKS = (1.0, 0.3, 0.1, 0.03)  # of the noise of the positions, tried at firs
 _FEWEST = 0.1  # share of good triples of neighbours that tell the scale of differences …
 _DIFFER = 0.25  # … and share of the scale of differences that no figure to begin with falls below
 _MANY = 0.2  # share of gross errors supposed meanwhile, in rows or not
-_BRIEFLY = 16  # hypotheses kept meanwhile
 _WIDEST = 3.4  # logarithm of the factor that a round may change a figure by
 _LEAST = 0.3  # share of the figures begun with that none falls below
 _NO_DIGIT = 1e-8  # m/s, below which velocities are not rounded
 _MATTERS = 1.05  # … and how much more than white noise rounding must cost to count
-_BEGIN = 3  # epochs whose likelihood is that of the start
 
 
 class Learnt(NamedTuple):
@@ -183,7 +181,7 @@ def likelihood(
         return -figures.cost
     prior = supposed(axes, *_usual(figures), speed, longest)._replace(isolated=_MANY, row=_MANY)
     motion, epochs = _motion(figures, axes, order, period), _epochs(sample, figures)
-    return _evidence(motion, figures, prior, epochs, _BRIEFLY)
+    return _evidence(motion, figures, prior, epochs, BRIEFLY)
 
 
 def _rounded(
@@ -297,9 +295,7 @@ def _evidence(
 ) -> float:
     """Log-likelihood of the observations under some figures."""
     moving = motion._replace(density=np.full(motion.axes, figures.process**2))
-    bank = no_hypotheses(motion, most)
-    _, found, _ = filter_hypotheses(moving, prior, epochs, bank, traced=False)
-    return float(found.evidence[_BEGIN:].sum())
+    return evidence(moving, prior, epochs, most, begin=BEGIN)
 
 
 def _begun(
@@ -329,7 +325,7 @@ def _begun(
         spread = prior.spread.copy()
         spread[: motion.axes] = _WILD * _usual(trial)[0]
         ready = prior._replace(isolated=_MANY, row=_MANY, spread=spread)
-        reached.append(_evidence(motion, trial, ready, _epochs(sample, trial), _BRIEFLY))
+        reached.append(_evidence(motion, trial, ready, _epochs(sample, trial), BRIEFLY))
     return trials[int(np.argmax(reached))]
 
 

@@ -15,8 +15,9 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from surefix.filters.hypotheses import Prior, no_hypotheses
-from surefix.filters.multi_hypothesis import filter_hypotheses
+from surefix.filters.hypotheses import Prior
+from surefix.filters.hypothesis_evidence import BEGIN, evidence
+from surefix.filters.modes import rows_of
 from surefix.filters.records import Epochs, Estimate, Motion
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray, IntArray
@@ -32,10 +33,7 @@ _DOWN, _UP = 1e-8, 100.0  # far below and far above, as variances
 _COARSE: Final = 16.0  # factor between two densities that are tried …
 _FINE: Final = 1.5 ** np.array([-4.0, -2.0, 2.0, 4.0])  # … and those about the best of them
 _GAIN: Final = 10.0  # log-likelihood that is worth a change
-_BRIEFLY: Final = 16  # hypotheses that it is found with …
-_BEGIN: Final = 3  # … but for the first epochs
 _LOUDER: Final = 1.25  # after an estimate that changed nothing, factor on what calls for the next …
-_LOUDEST: Final = 15.0  # … standard deviations at most …
 _PAUSE: Final = 20_000  # … for so many epochs at most
 
 State = TypeVar("State")
@@ -141,29 +139,24 @@ def follow(
     """
     found: list[Estimate] = []
     changes: list[Change] = []
-    at = 0
+    at, whole = 0, len(epochs.time)
     while True:
         current = motion._replace(density=lively.density)
-        part = _part(epochs, slice(at, None))
+        part = rows_of(epochs, at, whole)
         after, estimate = run(current, part, state)
-        end, asked = _asked(lively, current, blocks, estimate)
+        end, lively, larger = _watched(lively, current, blocks, part, estimate, prior)
         if end < len(part.time):
-            part = _part(part, slice(0, end))
-            after, estimate = run(current, part, state)
-        lively = _noted(lively, current, blocks, part, estimate)
+            after, estimate = run(current, rows_of(part, 0, end), state)
         state, at = after, at + end
         found.append(estimate)
-        for block, far in asked.items():
-            lively, process = _estimated(lively, current, prior, blocks[block], block, far)
-            if process > 0.0:
-                before = float(current.density[blocks[block][0]]) ** 0.5
-                changes.append(Change(at - 1, block, before, process))
-        if at >= len(epochs.time):
+        for block in larger:
+            before, process = (
+                float(density[blocks[block][0]]) ** 0.5
+                for density in (current.density, lively.density)
+            )
+            changes.append(Change(at - 1, block, before, process))
+        if at >= whole:
             return state, lively, _joined(found), tuple(changes)
-
-
-def _part(epochs: Epochs, part: slice) -> Epochs:
-    return Epochs._make(each[part] for each in epochs)
 
 
 def _joined(parts: list[Estimate]) -> Estimate:
@@ -172,23 +165,89 @@ def _joined(parts: list[Estimate]) -> Estimate:
     return Estimate._make(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
-def _products(
-    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
-) -> tuple[FloatArray, FloatArray]:
-    """(n, blocks, 2, 3) sums and counts at each epoch, the open step first; and (m,) the last."""
-    used, d = np.isfinite(found.standardised), motion.axes
+def _watched(
+    lively: Lively,
+    motion: Motion,
+    blocks: Sequence[Sequence[int]],
+    epochs: Epochs,
+    found: Estimate,
+    prior: Prior,
+) -> tuple[int, Lively, list[int]]:
+    """Watch a part step by step, until some block calls for more process noise.
+
+    Returns after how many epochs that is, or all of them, what is remembered then, and the blocks.
+    """
+    products = _products(lively, blocks, found)
+    steps = _steps(lively, products)
+    far = _loudness(steps)
+    density, level = lively.density.copy(), lively.level.copy()
+    rest, pause = lively.rest.copy(), lively.pause.copy()
+    end, done, larger = len(epochs.time), len(far), []
+    for step in np.flatnonzero((far > _FAR).any(axis=1)).tolist():
+        until = (step + 1) * _STEP - len(lively.products)
+        called = far[step] > np.where(step < rest, level, _FAR)
+        for block in np.flatnonzero(called).tolist():
+            axes = list(blocks[block])
+            best = _likeliest(_recent(lively, epochs, found, until), motion, prior, axes)
+            rest[block] = step + 1
+            if best > motion.density[axes[0]]:
+                density[axes], pause[block] = best, _WINDOW // _STEP
+                larger.append(block)
+            else:
+                level[block] = _LOUDER * far[step, block]
+                rest[block] += pause[block]
+                pause[block] = min(2 * pause[block], _PAUSE // _STEP)
+        if larger:
+            end, done = until, step + 1
+            break
+    steps = steps[done : done + _SCALES[-1]].copy()
+    steps[:, larger] = 0.0  # what went before was judged by less
+    after = Lively(
+        density,
+        _recent(lively, epochs, found, end),
+        _last(lively, found, end),
+        products[done * _STEP : len(lively.products) + end].copy(),
+        steps,
+        level,
+        np.maximum(rest - done, 0),
+        pause,
+    )
+    return end, after, larger
+
+
+def _products(lively: Lively, blocks: Sequence[Sequence[int]], found: Estimate) -> FloatArray:
+    """(n, blocks, 2, 3) sums and counts at each epoch, those of the open step first."""
+    used, d = np.isfinite(found.standardised), found.standardised.shape[1] // 2
     out = np.zeros((len(used), len(blocks), 2, 3))
-    last = lively.last.copy()
     for b, axes in enumerate(blocks):
         for c in (*axes, *(d + a for a in axes)):
             rows = np.flatnonzero(used[:, c])
             values = np.clip(found.standardised[rows, c], -_LARGEST, _LARGEST)
-            before = np.concatenate([[last[c]], values])[:-1]
+            before = np.concatenate([[lively.last[c]], values])[:-1]
             known = np.isfinite(before)
             product = (values * before)[known]
             out[rows[known], b, c // d] += np.column_stack((product, product**2, known[known]))
-            last[c] = values[-1] if len(values) else last[c]
-    return np.concatenate([lively.products, out]), last
+    return np.concatenate([lively.products, out])
+
+
+def _last(lively: Lively, found: Estimate, end: int) -> FloatArray:
+    """(m,) the last standardised innovation of each component before an epoch."""
+    last = lively.last.copy()
+    for c in range(len(last)):
+        seen = np.flatnonzero(np.isfinite(found.standardised[:end, c]))
+        if len(seen):
+            last[c] = np.clip(found.standardised[seen[-1], c], -_LARGEST, _LARGEST)
+    return last
+
+
+def _recent(lively: Lively, epochs: Epochs, found: Estimate, end: int) -> Epochs:
+    """The last epochs before one of a part, their variances as adapted."""
+    first, axes = max(0, end - _WINDOW), epochs.z.shape[1] // 2
+    part = rows_of(epochs, first, end)
+    variance = part.variance.copy()
+    variance[:, :axes] *= found.scale[first:end, None]
+    pairs = zip(lively.recent, part._replace(variance=variance), strict=True)
+    return Epochs._make(np.concatenate(pair)[-_WINDOW:] for pair in pairs)
 
 
 def _steps(lively: Lively, products: FloatArray) -> FloatArray:
@@ -201,29 +260,19 @@ def _steps(lively: Lively, products: FloatArray) -> FloatArray:
     return np.concatenate([lively.steps, total])
 
 
-def _asked(
-    lively: Lively, motion: Motion, blocks: Sequence[Sequence[int]], found: Estimate
-) -> tuple[int, dict[int, float]]:
-    """Tell after how many epochs an estimate is called for, of which blocks, and how loudly.
+def _loudness(steps: FloatArray) -> FloatArray:
+    """(n, blocks) standard deviations above nought of what (8 + n, blocks, 2, 3) steps sum up to.
 
-    All epochs, and of none, where it is not.
+    The largest over what is looked back over.
     """
-    products, _ = _products(lively, motion, blocks, found)
-    steps, most = _steps(lively, products), _SCALES[-1]
-    number = len(steps) - most
-    far = np.zeros((number, len(blocks)))
-    total = np.zeros((number, len(blocks), 2, 3))
-    for k in range(most):
-        total += steps[most - k : most - k + number]
+    number = len(steps) - _SCALES[-1]
+    far = np.zeros((number, steps.shape[1]))
+    total = np.zeros((number, *steps.shape[1:]))
+    for k in range(_SCALES[-1]):
+        total += steps[_SCALES[-1] - k : len(steps) - k]
         if k + 1 in _SCALES:
             np.maximum(far, _far(total), out=far)
-    resting = np.arange(number)[:, None] < lively.rest
-    called = far > np.where(resting, lively.level, _FAR)
-    if not called.any():
-        return len(found.mean), {}
-    step = int(np.argmax(called.any(axis=1)))
-    end = (step + 1) * _STEP - len(lively.products)
-    return end, {b: float(far[step, b]) for b in np.flatnonzero(called[step]).tolist()}
+    return far
 
 
 def _far(total: FloatArray) -> FloatArray:
@@ -238,62 +287,25 @@ def _far(total: FloatArray) -> FloatArray:
     return np.asarray(asked[..., 0] / np.sqrt(np.maximum(asked[..., 1], 1.0)))
 
 
-def _noted(
-    lively: Lively,
-    motion: Motion,
-    blocks: Sequence[Sequence[int]],
-    epochs: Epochs,
-    found: Estimate,
-) -> Lively:
-    """Remember what a part brought."""
-    products, last = _products(lively, motion, blocks, found)
-    steps = _steps(lively, products)
-    number = len(products) // _STEP
-    variance = epochs.variance.copy()
-    variance[:, : motion.axes] *= found.scale[:, None]
-    epochs = epochs._replace(variance=variance)
-    pairs = zip(lively.recent, epochs, strict=True)
-    recent = Epochs._make(np.concatenate(pair)[-_WINDOW:] for pair in pairs)
-    return lively._replace(
-        recent=recent,
-        last=last,
-        products=products[number * _STEP :],
-        steps=steps[-_SCALES[-1] :],
-        rest=np.maximum(lively.rest - number, 0),
-    )
+def _likeliest(recent: Epochs, motion: Motion, prior: Prior, axes: list[int]) -> float:
+    """Density of the process noise of some axes: a larger one if clearly likelier, else as now."""
+    now = float(motion.density[axes[0]])
 
+    def likely(density: float) -> float:
+        return _evidence(recent, motion, prior, axes, density)
 
-def _estimated(
-    lively: Lively, motion: Motion, prior: Prior, axes: Sequence[int], block: int, far: float
-) -> tuple[Lively, float]:
-    """Estimate the process noise of a block anew; its root if it is clearly larger, else 0."""
-    now = float(lively.density[axes[0]])
-
-    def evidence(density: float) -> float:
-        return _evidence(lively.recent, motion, prior, axes, density)
-
-    low, high = _bounds(lively.recent, motion, axes)
+    low, high = _bounds(recent, motion, axes)
     coarse = [
         q for q in low * _COARSE ** np.arange(np.log(high / low) / np.log(_COARSE)) if q > now
     ]
-    reached = {q: evidence(q) for q in (now, *coarse)}
+    reached = {q: likely(q) for q in (now, *coarse)}
     best = max(reached, key=lambda q: reached[q])
-    reached |= {q: evidence(q) for q in best * _FINE if q > now}
+    reached |= {q: likely(q) for q in best * _FINE if q > now}
     best = max(reached, key=lambda q: reached[q])
-    level, rest, pause = lively.level.copy(), lively.rest.copy(), lively.pause.copy()
-    if reached[best] - reached[now] < _GAIN:
-        level[block], rest[block] = min(_LOUDER * far, _LOUDEST), pause[block]
-        pause[block] = min(2 * pause[block], _PAUSE // _STEP)
-        return lively._replace(level=level, rest=rest, pause=pause), 0.0
-    rest[block], pause[block] = 0, _WINDOW // _STEP
-    density, steps = lively.density.copy(), lively.steps.copy()
-    density[list(axes)] = best
-    steps[:, block] = 0.0  # what went before was judged by less
-    after = lively._replace(density=density, steps=steps, rest=rest, pause=pause)
-    return after, best**0.5
+    return best if reached[best] - reached[now] >= _GAIN else now
 
 
-def _bounds(recent: Epochs, motion: Motion, axes: Sequence[int]) -> tuple[float, float]:
+def _bounds(recent: Epochs, motion: Motion, axes: list[int]) -> tuple[float, float]:
     """Densities whose noise over a step is far below that of a fix, and far above what changes."""
     steps = np.diff(recent.time)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
@@ -315,7 +327,7 @@ def _bounds(recent: Epochs, motion: Motion, axes: Sequence[int]) -> tuple[float,
 
 
 def _evidence(
-    recent: Epochs, motion: Motion, prior: Prior, axes: Sequence[int], density: float
+    recent: Epochs, motion: Motion, prior: Prior, axes: list[int], density: float
 ) -> float:
     """Log-likelihood of the last epochs of some axes, whose fixes may be wrong for a while."""
     d = len(axes)
@@ -327,6 +339,4 @@ def _evidence(
         fixed=np.full((len(recent.time), 2 * d), np.nan),
     )
     alike = prior._replace(spread=prior.spread[columns])
-    bank = no_hypotheses(moving, _BRIEFLY)
-    _, found, _ = filter_hypotheses(moving, alike, epochs, bank, traced=False)
-    return float(found.evidence[_BEGIN:].sum())
+    return evidence(moving, alike, epochs, begin=BEGIN)

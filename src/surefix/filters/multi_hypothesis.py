@@ -354,6 +354,7 @@ def filter_hypotheses(
         The hypotheses after the series, what their mixture says, and how they came about.
     """
     n, most = len(epochs.time), len(bank.weight)
+    epochs = Epochs._make(np.ascontiguousarray(field) for field in epochs)  # one compiled form
     after = Bank._make(field.copy() for field in bank)
     place = rows_of(most)
     found = _blank(motion, n)

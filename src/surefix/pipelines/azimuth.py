@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from surefix.geo.angle import wrap
-from surefix.types import Channel, FloatArray, IntArray
+from surefix.pipelines.turning import Angles
+from surefix.types import FloatArray, IntArray
 
-__all__ = ["Headings", "azimuth_at", "headed", "settled"]
+__all__ = ["azimuth_at", "settled"]
 
-_KEPT: Final = 120.0  # s of headings that are kept
 _AWAY: Final = 2.0  # s after the last heading, for which the turn goes on
 _BESIDE: Final = 10.0  # s between two headings that still turn a velocity between them
 _MEDIAN: Final = 1.0  # s before and after, over which a heading is typical …
@@ -21,27 +20,7 @@ _INSTANTS: Final = 11  # … and instants at which it is looked at there
 _SPAN: Final = 0.5  # s before, over which the rate of turn is taken
 
 
-class Headings(NamedTuple):
-    """Headings of the last two minutes: (n,) s, rising, and (n,) rad, clockwise from north."""
-
-    time: FloatArray = np.empty(0)
-    heading: FloatArray = np.empty(0)
-
-
-def headed(headings: Headings, channels: Sequence[Channel], needed: float) -> Headings:
-    """Add headings; what is older than two minutes and before ``needed`` (s) is forgotten."""
-    series = [channel for channel in channels if channel.name == "heading_deg"]
-    if not series:
-        return headings
-    time = np.concatenate([headings.time, *(each.time for each in series)])
-    heading = np.concatenate([headings.heading, *(np.radians(each.value) for each in series)])
-    known = np.isfinite(time) & np.isfinite(heading)
-    time, first = np.unique(time[known], return_index=True)
-    keep = time >= min(needed, float(time[-1]) if len(time) else 0.0) - _KEPT
-    return Headings(time[keep], heading[known][first][keep])
-
-
-def azimuth_at(headings: Headings, time: FloatArray) -> FloatArray:
+def azimuth_at(headings: Angles, time: FloatArray) -> FloatArray:
     """Headings at given times, rad: between two at most 10 s apart, or up to 2 s after the last.
 
     Each is the median of those within a second, so that less than a second of wrong ones does
@@ -77,7 +56,7 @@ def azimuth_at(headings: Headings, time: FloatArray) -> FloatArray:
     return np.where(there, heading + moved, np.nan)
 
 
-def settled(headings: Headings) -> float:
+def settled(headings: Angles) -> float:
     """Time up to which another heading changes nothing that `azimuth_at` says, s."""
     known = headings.time
     sure = known[known <= known[-1] - _MEDIAN] if len(known) else known
@@ -92,9 +71,9 @@ def _stretch(known: FloatArray, index: IntArray) -> tuple[IntArray, IntArray]:
     return bounds[stretch], bounds[stretch + 1] - 1
 
 
-def _typical(headings: Headings, index: IntArray) -> FloatArray:
+def _typical(headings: Angles, index: IntArray) -> FloatArray:
     """Median of the headings within a second of some of them, at as many instants on each side."""
-    known, own = headings.time, headings.heading[index]
+    known, own = headings.time, headings.angle[index]
     first, last = _stretch(known, index)
     here = known[index]
     wide = np.minimum(_MEDIAN, np.minimum(here - known[first], known[last] - here))
@@ -102,7 +81,7 @@ def _typical(headings: Headings, index: IntArray) -> FloatArray:
     right = np.clip(np.searchsorted(known, instants), first[:, None], last[:, None])
     left = np.maximum(right - 1, first[:, None])
     nearest = np.where(instants - known[left] <= known[right] - instants, left, right)
-    return own + np.median(_turn(headings.heading[nearest] - own[:, None]), axis=1)
+    return own + np.median(_turn(headings.angle[nearest] - own[:, None]), axis=1)
 
 
 def _turn(angle: FloatArray) -> FloatArray:

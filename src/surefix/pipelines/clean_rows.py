@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from surefix.cleaning.duplicates import find_repeats
+from surefix.filters.hypotheses import Bank
 from surefix.filters.liveliness import Change, begin_lively, follow
+from surefix.filters.multi_hypothesis_modes import realtime_hypotheses
 from surefix.filters.records import Epochs, Estimate, Motion
 from surefix.pipelines.events import jump_events, motion_events, run_events, sensor_events
 from surefix.pipelines.judge import (
-    FilterState,
     Status,
     by_velocity,
     estimate,
@@ -158,27 +159,29 @@ def _estimated(
         )
         return replace(session, memory=memory), found, ()
 
-    def run(motion: Motion, epochs: Epochs, state: FilterState) -> tuple[FilterState, Estimate]:
-        return estimate(
+    prior, given = setup.prior, session.options.process is not None
+    if session.options.mode != "realtime" or prior is None or given:
+        after, found = estimate(
             session.options,
-            motion,
+            setup.motion,
             setup.recovery,
-            setup.prior,
+            prior,
             setup.lag,
-            epochs,
+            all_rows.epochs,
             ~all_rows.auxiliary,
-            state,
+            session.filter,
         )
-
-    given = session.options.process is not None
-    if session.options.mode != "realtime" or setup.prior is None or given:
-        after, found = run(setup.motion, all_rows.epochs, session.filter)
         return replace(session, filter=after), found, ()
+
+    def run(motion: Motion, epochs: Epochs, bank: Bank) -> tuple[Bank, Estimate]:
+        return realtime_hypotheses(motion, prior, epochs, bank)
+
+    assert isinstance(session.filter, Bank)
     lively = session.lively or begin_lively(setup.motion, len(setup.blocks))
-    after, lively, found, changes = follow(
-        run, setup.motion, setup.blocks, lively, all_rows.epochs, session.filter, setup.prior
+    bank, lively, found, changes = follow(
+        run, setup.motion, setup.blocks, lively, all_rows.epochs, session.filter, prior
     )
-    return replace(session, filter=after, lively=lively), found, changes
+    return replace(session, filter=bank, lively=lively), found, changes
 
 
 def _judged(setup: Setup, all_rows: _Epochs, found: Estimate | None) -> Verdicts:

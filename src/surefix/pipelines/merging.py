@@ -14,7 +14,7 @@ import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
 from surefix.geo.angle import wrap
-from surefix.pipelines.azimuth import Headings, headed, settled
+from surefix.pipelines.azimuth import settled
 from surefix.pipelines.options import CleanOptions
 from surefix.pipelines.placing import Told, escorted, follow, known_until
 from surefix.pipelines.rows import (
@@ -106,7 +106,7 @@ class Merging(NamedTuple):
     released: float = -np.inf
     arms: tuple[Arm, ...] = ()
     turnings: tuple[Turning, Turning] = (Turning(), Turning())
-    headings: Headings = Headings()
+    headings: Turning = Turning()
 
     @property
     def ended(self) -> bool:
@@ -204,9 +204,9 @@ def _heeded(
     elif inflow.role in _ATTITUDE:
         inflow = inflow._replace(last_tau=_reached(log, inflow.last_tau))
     if inflow.role in ({*_HEADINGS} & roles or {"attitude"}) and "velocity" in roles:
-        headings = headed(merging.headings, log.channels, merging.released)
+        headings = turned(merging.headings, log.channels, merging.released, ("heading",))
         merging = merging._replace(headings=headings)
-        sure = max(before, min(inflow.last_tau, settled(headings)))
+        sure = max(before, min(inflow.last_tau, settled(headings.heading)))
         inflow = inflow._replace(last_tau=sure)
     if inflow.role == "ship" or (log.axes and "ship" in roles):
         newest = max((each.last_tau for each in merging.inflows), default=-np.inf)
@@ -341,7 +341,7 @@ def _release(
         free = take_rows(rows, ~stay)
         if inflow.axes == BODY and len(free.tau):
             sigma = np.radians(options.sigma_heading_deg)
-            free, more = steered(free, merging.headings, sigma, inflow.sensors[0])
+            free, more = steered(free, merging.headings.heading, sigma, inflow.sensors[0])
             problems += more
         elif inflow.axes and len(free.tau):
             free, more = escorted(free, inflow.axes, told, inflow.sensors[0])

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from surefix.cleaning.clock import ClockState, repair
+from surefix.io.attitude_sentence import ATTITUDE
 from surefix.pipelines.inputs import open_log
 from surefix.pipelines.ship_cleaning import Stream
 from surefix.types import BoolArray, FloatArray, Log
@@ -26,7 +27,6 @@ _QUANTITIES = {
     "water_speed_along_mps": "speed",
     "depth_m": "depth",
 }
-_ATTITUDE = ("PASHR", "PSXN", "PHTRO")
 _Parts = dict[tuple[str, str], list[tuple[FloatArray, FloatArray, BoolArray]]]
 
 
@@ -83,10 +83,10 @@ def _read(logs: Iterable[Log], parts: _Parts) -> None:
 def _once_more(sensor: str, parts: _Parts) -> bool:
     """Whether a heading beside roll and pitch is that of a sentence of its own in the same log."""
     log, _, sentence = sensor.rpartition(" ")
-    if sentence not in _ATTITUDE:
+    if sentence not in ATTITUDE:
         return False
     others = (other.rpartition(" ") for other, quantity in parts if quantity == "heading")
-    return any(each == log and own not in _ATTITUDE for each, _, own in others)
+    return any(each == log and own not in ATTITUDE for each, _, own in others)
 
 
 def _in_order(stream: Stream) -> Stream:

@@ -14,8 +14,9 @@ import numpy as np
 
 from surefix.errors import OptionsError
 from surefix.geo.local_frame import rotate
-from surefix.pipelines.azimuth import Headings, azimuth_at
+from surefix.pipelines.azimuth import azimuth_at
 from surefix.pipelines.rows import Rows, take_fixes
+from surefix.pipelines.turning import Angles
 from surefix.types import Channel, Fixes, FloatArray, IntArray, Log, Problem
 
 __all__ = ["BODY", "NOT_CLEANED", "Support", "no_heading", "steered", "support"]
@@ -126,7 +127,7 @@ def _observed(
 
 
 def steered(
-    rows: Rows, headings: Headings, sigma_heading: float, sensor: str
+    rows: Rows, headings: Angles, sigma_heading: float, sensor: str
 ) -> tuple[Rows, tuple[Problem, ...]]:
     """Velocities along the vehicle's axes turned to east, north, up; without heading left out.
 
