@@ -5,15 +5,20 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from service.test_station import minutes, sentence
+from service.test_station import minutes, sentence, table
+from surefix.pipelines.clean import clean_sources
+from surefix.pipelines.inputs import open_inputs
+from surefix.pipelines.joining import join
 from surefix.pipelines.options import CleanOptions
 from surefix.service import keeper
 from surefix.service.addresses import Address
 from surefix.service.inbox import Arrived
 from surefix.service.live import begin_live, step
 from surefix.service.options import InputOptions, LiveOptions
+from surefix.service.station import begin_station, receive
 
 START = 1_785_585_600.0  # 2026-08-01T12:00:00Z
 CLEAN = CleanOptions(mode="realtime", settle_rows=60, reorder_s=2.0)
@@ -125,3 +130,19 @@ def sail(live, ship, seconds, heard, *, begin=0, late=0.2):
 
     asyncio.run(go())
     return told
+
+
+def cleaned_again(live, folder):
+    """Clean the mission from its journal, once as live and once from the beginning to the end.
+
+    What the live run confirmed is the same to the last bit. Returns it, and the other run.
+    """
+    station, given = begin_station(live.options), []
+    for piece in live.journal.received():
+        station, batches = receive(station, [piece])
+        given += batches
+    live.journal.close()
+    again = clean_sources(open_inputs([folder / "mission.db"]), live.options.clean)
+    confirmed = table(join(given))
+    pd.testing.assert_frame_equal(confirmed, table(again).iloc[: len(confirmed)], check_exact=True)
+    return confirmed, again

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from pipelines.rolling import ARM, Rolling
@@ -11,17 +10,13 @@ from service.receivers import (  # noqa: F401
     CLEAN,
     START,
     _patient,
+    cleaned_again,
     gga,
     hdt,
     sail,
     sentence,
     service_of,
 )
-from service.test_station import table
-from surefix.pipelines.clean import clean_sources
-from surefix.pipelines.inputs import open_inputs
-from surefix.pipelines.joining import join
-from surefix.service.station import begin_station, receive
 
 SHIP = Rolling(200.0, seed=6)
 CARRIED = replace(CLEAN, lever_arm={"mast": ARM.tolist()}, sigma_attitude_deg=0.2)
@@ -80,15 +75,7 @@ def test_live_the_mast_is_carried_by_roll_and_pitch(tmp_path):
     assert (seen.quantity, seen.validity) == ("attitude", "valid")
     assert told[118].sensors["mru PASHR"].rate == pytest.approx(5.0, rel=0.1)
     assert told[139].sensors["mru PASHR"].word == "stale"
-    # The journal, cleaned again, gives the same to the last bit
-    station, given = begin_station(live.options), []
-    for piece in live.journal.received():
-        station, batches = receive(station, [piece])
-        given += batches
-    live.journal.close()
-    again = clean_sources(open_inputs([tmp_path / "mission.db"]), live.options.clean)
-    confirmed = table(join(given))
-    pd.testing.assert_frame_equal(confirmed, table(again).iloc[: len(confirmed)], check_exact=True)
+    confirmed, again = cleaned_again(live, tmp_path)
     assert len(confirmed) > 140
     assert again.track.time[0] == START + 0.1
     (problem,) = again.problems

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from service.receivers import (  # noqa: F401
@@ -11,19 +10,15 @@ from service.receivers import (  # noqa: F401
     START,
     Ship,
     _patient,
+    cleaned_again,
     gga,
     hdt,
     sail,
     service_of,
 )
-from service.test_station import table
 from surefix.errors import OptionsError
 from surefix.io.options_file import read_options
-from surefix.pipelines.clean import clean_sources
-from surefix.pipelines.inputs import open_inputs
-from surefix.pipelines.joining import join
 from surefix.service.options import read_live
-from surefix.service.station import begin_station, receive
 
 SHIP = Ship(260.0, seed=3, turning=0.03)
 BOW, STERN, MAST = [40.0, 0.0, 20.0], [-30.0, 6.0, 15.0], [5.0, -8.0, 30.0]
@@ -125,14 +120,7 @@ def test_the_mission_is_cleaned_again_with_the_same_arms(tmp_path):
     """Live and `surefix clean` give the same numbers, whatever came first."""
     live = service(tmp_path, ["bow", "stern"])
     sail(live, SHIP, 130, heard_of(["bow", "stern"], dark=range(90, 100)))
-    station, given = begin_station(live.options), []
-    for piece in live.journal.received():
-        station, batches = receive(station, [piece])
-        given += batches
-    live.journal.close()
-    again = clean_sources(open_inputs([tmp_path / "mission.db"]), live.options.clean)
-    confirmed = table(join(given))
-    pd.testing.assert_frame_equal(confirmed, table(again).iloc[: len(confirmed)], check_exact=True)
+    confirmed, again = cleaned_again(live, tmp_path)
     assert len(confirmed) > 180
     assert again.track.time[0] == START
 

@@ -18,7 +18,14 @@ from surefix.filters.hypothesis_review import deleted_residuals
 from surefix.filters.hypothesis_trail import Decisions
 from surefix.filters.learning_shares import counted
 from surefix.filters.multi_hypothesis_modes import decide_offline
-from surefix.filters.noise import NoiseFigures, Observations, initial_scales, sample_of, variances
+from surefix.filters.noise import (
+    NoiseFigures,
+    Observations,
+    initial_scales,
+    sample_of,
+    typical_step,
+    variances,
+)
 from surefix.filters.records import Epochs, Motion
 from surefix.filters.rounding import rounding_noise
 from surefix.filters.simplex import descend
@@ -222,8 +229,7 @@ def _rounded(
 
 def _interval(time: FloatArray, z: FloatArray) -> float:
     """Median time between what is observed, s; 0 where there is too little."""
-    steps = np.diff(time[np.isfinite(z).any(axis=1)])
-    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    return typical_step(time[np.isfinite(z).any(axis=1)], alone=0.0)
 
 
 def _motion(figures: NoiseFigures, axes: int, order: int, period: float) -> Motion:

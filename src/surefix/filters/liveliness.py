@@ -18,6 +18,7 @@ import numpy as np
 from surefix.filters.hypotheses import Prior
 from surefix.filters.hypothesis_evidence import BEGIN, evidence
 from surefix.filters.modes import rows_of
+from surefix.filters.noise import typical_step
 from surefix.filters.records import Epochs, Estimate, Motion
 from surefix.filters.track import by_axis
 from surefix.types import FloatArray, IntArray
@@ -307,8 +308,7 @@ def _likeliest(recent: Epochs, motion: Motion, prior: Prior, axes: list[int]) ->
 
 def _bounds(recent: Epochs, motion: Motion, axes: list[int]) -> tuple[float, float]:
     """Densities whose noise over a step is far below that of a fix, and far above what changes."""
-    steps = np.diff(recent.time)
-    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
+    step = typical_step(recent.time)
     least, most = np.inf, 0.0
     for c in (*axes, *(motion.axes + a for a in axes)):
         z = recent.z[:, c]

@@ -27,6 +27,7 @@ __all__ = [
     "initial_scales",
     "sample_of",
     "speed_scale",
+    "typical_step",
     "variances",
 ]
 
@@ -275,11 +276,20 @@ def initial_scales(
 
 def _reference_process(sample: Observations, position: FloatArray, order: int) -> float:
     """√q at which a step's process noise equals the measurement noise."""
-    dt = np.diff(sample.time)
-    step = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else 1.0
+    step = typical_step(sample.time)
     seen = position[np.isfinite(position)]
     sigma = float(seen.min()) if len(seen) else 1.0
     return float(sigma / step ** (order - 0.5))
+
+
+def typical_step(time: FloatArray, alone: float = 1.0) -> float:
+    """Median of the positive steps of ``time`` (n,), s; ``alone`` where there is none.
+
+    >>> typical_step(np.array([0.0, 1.0, 1.0, 3.0, 4.0]))
+    1.0
+    """
+    steps = np.diff(time)
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else alone
 
 
 def variances(observations: Observations, figures: NoiseFigures) -> FloatArray:
@@ -304,8 +314,7 @@ def _cost(
     n = len(sample.time)
     group = np.repeat([0, 1], axes)
     motion = Motion(order, axes, np.full(axes, figures.process**2), group, 2, period)
-    dt = np.diff(sample.time)
-    typical = float(np.median(dt[dt > 0.0])) if (dt > 0.0).any() else 1.0
+    typical = typical_step(sample.time)
     speed = max(speed_scale(sample.time, np.nan_to_num(sample.z[:, 0])), 1e-6)
     recovery = Recovery(30.0 * typical, speed)
     epochs = Epochs(

@@ -11,7 +11,14 @@ from surefix.cleaning.duplicates import RepeatState, find_repeats, start_repeats
 from surefix.filters.health import Health, no_health, watch
 from surefix.filters.learning import supposed
 from surefix.filters.liveliness import Lively, begin_lively, follow
-from surefix.filters.noise import NoiseFigures, Observations, estimate_noise, grain, speed_scale
+from surefix.filters.noise import (
+    NoiseFigures,
+    Observations,
+    estimate_noise,
+    grain,
+    speed_scale,
+    typical_step,
+)
 from surefix.filters.records import Epochs, Estimate, Motion, Recovery
 from surefix.filters.track import by_axis
 from surefix.geo.angle import wrap
@@ -196,9 +203,7 @@ def _settle(
     order = MODELS["cv" if options.model == "auto" else options.model]
     quantum = grain(z[seen])
     figures = estimate_noise(observations, unknown, order=order, period=new.period, quantum=quantum)
-    steps = np.diff(tau[seen])
-    steps = steps[steps > 0.0]
-    interval = float(np.median(steps)) if len(steps) else 1.0
+    interval = typical_step(tau[seen])
     turned = np.unwrap(z[seen], period=new.period) if new.period else z[seen]
     speed = max(speed_scale(tau[seen], turned), 1e-6)
     recovery = Recovery(options.patience(interval), speed)
