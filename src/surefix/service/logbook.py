@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from surefix.service import alarms
-from surefix.service.live import Live
+from surefix.service.running import Live
 
 __all__ = ["Logbook", "Watchdog"]
 

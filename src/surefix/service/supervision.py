@@ -17,7 +17,7 @@ from surefix.service.sensors import SensorState
 
 if TYPE_CHECKING:
     from surefix.service.keeper import Gap
-    from surefix.service.live import Live
+    from surefix.service.running import Live
 
 __all__ = ["acknowledge", "heed", "judge", "remember", "tell_gap"]
 

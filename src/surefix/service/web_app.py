@@ -21,7 +21,7 @@ from surefix.service.web_pages import Page
 from surefix.service.web_record import AlarmRecord, StateRecord, TrackRecord, track_record
 
 if TYPE_CHECKING:
-    from surefix.service.live import Live
+    from surefix.service.running import Live
 
 __all__ = ["SessionRecord", "web_app"]
 

@@ -15,7 +15,7 @@ from surefix.service.web_guard import WebState
 from surefix.service.web_record import StateRecord, rows_record, state_record
 
 if TYPE_CHECKING:
-    from surefix.service.live import Live
+    from surefix.service.running import Live
 
 __all__ = ["Hub"]
 

@@ -19,7 +19,7 @@ from surefix.service.web_guard import WebState
 from surefix.types import Verdict
 
 if TYPE_CHECKING:
-    from surefix.service.live import Live
+    from surefix.service.running import Live
 
 __all__ = ["Metrics"]
 

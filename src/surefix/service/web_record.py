@@ -21,7 +21,7 @@ from surefix.service.sensors import SensorState
 from surefix.types import FloatArray, IntArray, Verdict
 
 if TYPE_CHECKING:
-    from surefix.service.live import Live
+    from surefix.service.running import Live
     from surefix.service.station import Latest
 
 __all__ = [

@@ -24,7 +24,7 @@ from surefix.service.web_options import WebOptions
 from surefix.service.web_pages import pages
 
 if TYPE_CHECKING:
-    from surefix.service.live import Live
+    from surefix.service.running import Live
 
 __all__ = ["Web", "open_web"]
 
