@@ -66,18 +66,14 @@ class _Kernel(JITCodeLibrary):
 
 
 class _Part(JITCodeLibrary):
-    """Code of a part and of the parts that it calls, not for the processor."""
+    """Code of a part, not for the processor: it is optimised, and linked to others, in a kernel."""
+
+    def _optimize_final_module(self) -> None:
+        pass
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._finalized = True
-
-
-class _LeanPart(_Part):
-    """Without references that are counted there is nothing to gain before it is in the kernel."""
-
-    def _optimize_final_module(self) -> None:
-        pass
 
 
 class KernelCompiler(CompilerBase):
@@ -88,7 +84,6 @@ class KernelCompiler(CompilerBase):
     """
 
     _library: type[JITCodeLibrary] = _Kernel
-    _lean_library: type[JITCodeLibrary] = _Kernel
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -104,8 +99,7 @@ class KernelCompiler(CompilerBase):
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
         codegen = self.state.targetctx.codegen()
-        library = self._library if self.state.flags.nrt else self._lean_library
-        self.state.library = library(codegen, func.__qualname__)
+        self.state.library = self._library(codegen, func.__qualname__)
         self.state.library.enable_object_caching()
         collecting = gc.isenabled()
         gc.disable()
@@ -120,7 +114,6 @@ class PartCompiler(KernelCompiler):
     """Compile a function that only kernels call, without making machine code of it."""
 
     _library = _Part
-    _lean_library = _LeanPart
 
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation, the last but one replaced."""
