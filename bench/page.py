@@ -36,9 +36,10 @@ NOTES = """
   figures are not compared.
 - **One call an epoch**: state and covariance come back to Python each time.
 - **Running median**: normal noise, compared where the whole window lies inside the series.
-- **Tracks**: about a gigabyte is written, and what the system takes to find that memory is a large
-  part of the time. Without missing observations all tracks have one covariance, which `vmap`
-  computes once; ours is computed for each, as it must be where any are missing or weighed.
+- **Tracks**: means and covariances of all tracks. Without weights and with the same gaps all
+  tracks have one covariance. Ours finds that out from the observations, computes it once and gives
+  one array that is seen by every track; `vmap` computes it once, too, and writes it for each. What
+  the system takes to find the memory is a large part of the time.
 - **Hampel**: the peer computes in single precision.
 - **Hypotheses** and the filter and smoother of `surefix clean` have no peer that does the same.
 """

@@ -33,7 +33,8 @@ from numpy.typing import ArrayLike
 
 from surefix.errors import OptionsError
 from surefix.filters.kalman import Gaussian, Spread
-from surefix.filters.linear_step import LinearModel, run, step
+from surefix.filters.linear_parts import LinearModel
+from surefix.filters.linear_step import follow, run, step
 from surefix.robust.loss import Loss, loss_named
 from surefix.rows import Size, size_of
 from surefix.types import FloatArray
@@ -49,12 +50,16 @@ __all__ = [
 ]
 
 _SLICES = 4  # pieces of work a core, so that none waits for another
+_TOGETHER = 64  # series in a piece of those that share: their epochs stay in the nearest cache
 _ALIKE = 1e-9  # relative difference of what is called symmetric
 _EXTREME = 1e-9  # of the largest variance: how far below 0 rounding may bring an eigenvalue
 
 
 class LinearTrack(NamedTuple):
     """What the filter found at each of N epochs; of T series all fields are (T, N, …).
+
+    Series that share their covariances (see `filter_linear`) have one array of covariances and one
+    of weights, seen T times; these are read-only.
 
     Parameters
     ----------
@@ -96,7 +101,10 @@ def filter_linear(
     """Predict and update at every epoch, weighing each component by itself.
 
     The same as calling `surefix.filters.kalman.predict` and `surefix.filters.kalman.update` in
-    turn, at the speed of compiled code. Many series of one model run on all cores.
+    turn, at the speed of compiled code. Many series of one model run on all cores. Where nothing
+    is weighed, and all begin with one covariance and have the same gaps, all covariances are the
+    same: they are computed once. Each series has the figures that it has by itself, but for the
+    rounding of the last bit.
 
     Parameters
     ----------
@@ -127,32 +135,56 @@ def filter_linear(
             f"a state of shapes {x.mean.shape} and {x.factor.shape}",
             f"({n},) and ({n}, {n}), with a leading {tuple(series)} or not",
         )
-    model, by_noise = linear_model(F, Q, H, R, (n, m, N)), spread == "noise"
+    model, usable = linear_model(F, Q, H, R, (n, m, N)), _usable(loss)
     T = series[0] if series else 1
-    out = (
-        np.empty((T, N, n)),
-        np.empty((T, N * n, n)),
-        *(np.empty((T, N, m)) for _ in range(3)),
-    )
-    arrays = (
+    start, first, rows = (
         np.ascontiguousarray(np.broadcast_to(x.mean, (*series, n)), np.float64).reshape(T, 1, n),
         np.ascontiguousarray(np.broadcast_to(x.covariance, (*series, n, n))).reshape(T, n, n),
         seen.reshape(T, N, m),
-        *out,
     )
-    usable = _usable(loss)
-    _on_all_cores(T, lambda some: run(model, usable, by_noise, *(each[some] for each in arrays)))
-    mean, covariance, *found = (each.reshape(*series, -1, *each.shape[2:]) for each in out)
-    return LinearTrack(mean, covariance.reshape(*mean.shape, n), *found)
+    own = 1 if usable.code == 0 and _alike(start, first, rows) else T
+    mean, residual, nis = np.empty((T, N, n)), np.empty((T, N, m)), np.empty((T, N, m))
+    covariance, weights = np.empty((own, N * n, n)), np.empty((own, N, m))
+
+    def alone(some: slice) -> None:
+        arrays = (start, first, rows, mean, covariance, residual, nis, weights)
+        run(model, usable, spread == "noise", *(each[some] for each in arrays))
+
+    def sharing(some: slice) -> None:
+        arrays = (start, rows, mean, residual, nis)
+        parts = (each[some].reshape(-1, each.shape[2]) for each in arrays)
+        follow(model, usable, covariance[0], first[0], *parts)
+
+    _on_all_cores(range(own), alone)
+    if own < T:
+        _on_all_cores(range(own, T), sharing, _TOGETHER)
+    found = mean, covariance.reshape(own, N, n, n), residual, nis, weights
+    return LinearTrack(*(_seen_by(each, tuple(series)) for each in found))
 
 
-def _on_all_cores(count: int, work: Callable[[slice], None]) -> None:
-    """Do ``count`` pieces of work in slices, on as many threads as there are cores."""
-    cores = min(os.cpu_count() or 1, count)
-    if cores < 2:
-        work(slice(0, count))
+def _alike(start: FloatArray, first: FloatArray, z: FloatArray) -> bool:
+    """Whether several series without weights have the same covariances."""
+    if len(z) < 2 or not np.isfinite(start).all() or not (first == first[:1]).all():
+        return False
+    return bool((np.isfinite(z) == np.isfinite(z[:1])).all())
+
+
+def _seen_by(found: FloatArray, series: tuple[int, ...]) -> FloatArray:
+    """What each series found, or the first for all of them."""
+    if not series:
+        alone: FloatArray = found[0]
+        return alone
+    return found if len(found) == series[0] else np.broadcast_to(found, (*series, *found.shape[1:]))
+
+
+def _on_all_cores(which: range, work: Callable[[slice], None], most: int | None = None) -> None:
+    """Do work in slices, of ``most`` or so where that is said, on as many threads as cores."""
+    cores = min(os.cpu_count() or 1, len(which))
+    if cores < 2 and most is None:
+        work(slice(which.start, which.stop))
         return
-    ends = np.linspace(0, count, min(_SLICES * cores, count) + 1).astype(np.int64)
+    count = max(_SLICES * cores, len(which) // (most or len(which)))
+    ends = np.linspace(which.start, which.stop, min(count, len(which)) + 1).astype(np.int64)
     with ThreadPoolExecutor(cores) as pool:
         list(pool.map(work, (slice(a, b) for a, b in itertools.pairwise(ends.tolist()))))
 

@@ -1,240 +1,32 @@
 """Kernels of the filter of a linear model: one epoch, series, and many series at once.
 
-Covariance form. The innovation covariance is reduced to ``S = L D Lᵀ`` while the same row
-operations turn ``H P`` into ``L⁻¹ H P``; each pivot then takes its share from P. That loses as many
-digits as the noise is smaller than the prediction, so epochs in which a variance falls by more than
-`_FALL` go by Joseph's form, ``(I − K H) P (I − K H)ᵀ + K R̄ Kᵀ``, which loses none.
-
-Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977; Joseph's form:
-Bar-Shalom, Li and Kirubarajan, 2001, 5.2.3.
+Made of `surefix.filters.linear_parts`, which says how it is done.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from surefix.filters.linear_parts import (
+    LinearModel,
+    absorb_rows,
+    eliminate_rows,
+    innovate_row,
+    joseph_rows,
+    move_row,
+    note_row,
+    observe_rows,
+    predict_rows,
+    weigh_rows,
+)
 from surefix.jit import inlined, kernel, threaded_kernel
-from surefix.robust.loss import Loss, weight
-from surefix.rows import ONE, Size, add_row, clear_row, copy_row, part, scratch, width
+from surefix.robust.loss import Loss
+from surefix.rows import ONE, Size, add_row, copy_row, part, scratch, width
 from surefix.types import FloatArray
 
-__all__ = ["LinearModel", "eliminate_rows", "predict_rows", "run", "step", "weigh_rows"]
-
-_FALL = 1e4  # ratio of S to R̄ above which the short form would lose more than four digits
-
-
-class LinearModel(NamedTuple):
-    """``x' = F x + w``, ``z = H x + v``.
-
-    Matrices stand one below the other: k is 1 for the same at all epochs, or N for one for each.
-
-    Parameters
-    ----------
-    F, F_T, Q
-        (k·n, n) transition, its transpose, and process noise.
-    H, H_T
-        (k·m, n) and (k·n, m).
-    R
-        (k·m, m).
-    states, components
-        Sizes n and m for the compiler, see `surefix.rows`.
-    """
-
-    F: FloatArray
-    F_T: FloatArray
-    Q: FloatArray
-    H: FloatArray
-    H_T: FloatArray
-    R: FloatArray
-    states: Size
-    components: Size
-
-
-@inlined
-def predict_rows(
-    x: FloatArray,
-    P: FloatArray,
-    y: FloatArray,
-    A: FloatArray,
-    F: FloatArray,
-    F_T: FloatArray,
-    f: int,
-    Q: FloatArray,
-    q: int,
-    states: Size,
-) -> None:
-    """``x = F x``, ``P = F P Fᵀ + Q`` with the matrices that begin at rows f and q."""
-    n = width(states)
-    clear_row(y, 0, states)
-    for i in range(n):
-        add_row(y, 0, x[0, i], F_T, f + i, states)
-    copy_row(x, 0, y, 0, states)
-    for i in range(n):
-        clear_row(A, i, states)
-        for j in range(n):
-            add_row(A, i, F[f + i, j], P, j, states)
-    for i in range(n):
-        copy_row(P, i, Q, q + i, states)
-        for j in range(n):
-            add_row(P, i, A[i, j], F_T, f + j, states)
-
-
-@inlined
-def _innovate(
-    x: FloatArray,
-    P: FloatArray,
-    e: FloatArray,
-    B: FloatArray,
-    S: FloatArray,
-    H: FloatArray,
-    H_T: FloatArray,
-    h: int,
-    R: FloatArray,
-    r: int,
-    states: Size,
-    components: Size,
-) -> None:
-    """``e = z − H x`` in place of z, ``B = H P`` and ``S = H P Hᵀ + R``."""
-    n, m = width(states), width(components)
-    for j in range(n):
-        add_row(e, 0, -x[0, j], H_T, h * n + j, components)
-    for c in range(m):
-        clear_row(B, c, states)
-        for j in range(n):
-            add_row(B, c, H[h * m + c, j], P, j, states)
-        copy_row(S, c, R, r + c, components)
-        for j in range(n):
-            add_row(S, c, B[c, j], H_T, h * n + j, components)
-
-
-@inlined
-def weigh_rows(
-    e: FloatArray,
-    S: FloatArray,
-    R: FloatArray,
-    r: int,
-    used: FloatArray,
-    root: FloatArray,
-    loss: Loss,
-    by_noise: bool,
-    components: Size,
-) -> bool:
-    """Weigh the components, ``R̄_ij = R_ij / √(w_i w_j)``; whether some variance falls far.
-
-    ``used`` is 0 for what is left out, whose innovation becomes 0; ``root`` is ``1 / √w``.
-    """
-    m = width(components)
-    changed = far = False
-    for c in range(m):
-        root[0, c] = 1.0
-        used[0, c] = 1.0
-        if not abs(e[0, c]) < np.inf:
-            used[0, c] = e[0, c] = 0.0
-        elif loss.code != 0:
-            variance = R[r + c, c] if by_noise else S[c, c]
-            w = weight(abs(e[0, c]) / math.sqrt(variance), loss.code, loss.k0, loss.k1)
-            if w < 1.0:
-                changed = True
-                used[0, c] = 1.0 if w > 0.0 else 0.0
-                root[0, c] = 1.0 / math.sqrt(w) if w > 0.0 else 1.0
-        if S[c, c] > _FALL * R[r + c, c]:
-            far = True
-    if changed:
-        for c in range(m):
-            if root[0, c] == 1.0:
-                continue
-            for d in range(m):
-                more = R[r + c, d] * (root[0, c] * root[0, d] - 1.0)
-                S[c, d] += more
-                if root[0, d] == 1.0:
-                    S[d, c] += more
-    return far
-
-
-@inlined
-def eliminate_rows(
-    x: FloatArray,
-    e: FloatArray,
-    B: FloatArray,
-    S: FloatArray,
-    L: FloatArray,
-    used: FloatArray,
-    states: Size,
-    components: Size,
-) -> None:
-    """``B = L⁻¹ H P``, the mean, and the inverse pivots in ``used``; −L below its diagonal."""
-    m = width(components)
-    for c in range(m):
-        inverse = used[0, c] / S[c, c]
-        used[0, c] = inverse
-        share = inverse * e[0, c]
-        add_row(x, 0, share, B, c, states)
-        for d in range(c + 1, m):
-            l = -S[d, c] * inverse
-            L[d, c] = l
-            add_row(S, d, l, S, c, components)
-            add_row(B, d, l, B, c, states)
-        add_row(e, 0, -share, S, c, components)
-
-
-@inlined
-def _joseph(
-    P: FloatArray,
-    A: FloatArray,
-    B: FloatArray,
-    L: FloatArray,
-    used: FloatArray,
-    root: FloatArray,
-    H: FloatArray,
-    h: int,
-    R: FloatArray,
-    r: int,
-    states: Size,
-    components: Size,
-) -> None:
-    """Joseph's form in the innovations ``L⁻¹ e``, whose gains are ``B[c] · used[c]``."""
-    n, m = width(states), width(components)
-    rows, noise = scratch(components, states), scratch(components, components)
-    turned, W = scratch(components, components), scratch(states, states)
-    W_T, spread = scratch(states, states), scratch(components, states)
-    for c in range(m):
-        copy_row(rows, c, H, h + c, states)
-        for d in range(m):
-            noise[c, d] = R[r + c, d] * root[0, c] * root[0, d]
-    for c in range(m):
-        for d in range(c + 1, m):
-            add_row(rows, d, L[d, c], rows, c, states)
-            add_row(noise, d, L[d, c], noise, c, components)
-    for c in range(m):
-        for d in range(m):
-            turned[c, d] = noise[d, c]
-    for c in range(m):
-        for d in range(c + 1, m):
-            add_row(turned, d, L[d, c], turned, c, components)
-    for i in range(n):
-        clear_row(W, i, states)
-        W[i, i] = 1.0
-        for c in range(m):
-            add_row(W, i, -B[c, i] * used[0, c], rows, c, states)
-        for j in range(n):
-            W_T[j, i] = W[i, j]
-    for i in range(n):
-        clear_row(A, i, states)
-        for j in range(n):
-            add_row(A, i, W[i, j], P, j, states)
-    for c in range(m):
-        clear_row(spread, c, states)
-        for d in range(m):
-            add_row(spread, c, turned[c, d] * used[0, d], B, d, states)
-    for i in range(n):
-        clear_row(P, i, states)
-        for j in range(n):
-            add_row(P, i, A[i, j], W_T, j, states)
-        for c in range(m):
-            add_row(P, i, B[c, i] * used[0, c], spread, c, states)
+__all__ = ["follow", "run", "step"]
 
 
 @inlined
@@ -256,6 +48,7 @@ def _series(
     n, m = width(states), width(components)
     x, y, e = scratch(ONE, states), scratch(ONE, states), scratch(ONE, components)
     used, root = scratch(ONE, components), scratch(ONE, components)
+    variance = scratch(ONE, components)
     P, A = scratch(states, states), scratch(states, states)
     B, S, L = (
         scratch(components, states),
@@ -270,20 +63,22 @@ def _series(
         copy_row(P, i, first, i, states)
     for k in range(z.shape[0]):
         f, q, h, r = f_step * k, q_step * k, h_step * k, r_step * k
-        predict_rows(x, P, y, A, F, F_T, f, Q, q, states)
-        copy_row(e, 0, z, k, components)
-        _innovate(x, P, e, B, S, H, H_T, h, R, r, states, components)
+        move_row(x, 0, F_T, f, y, 0, states)
+        copy_row(x, 0, y, 0, states)
+        predict_rows(P, A, F, F_T, f, Q, q, states)
+        innovate_row(x, 0, H_T, h * n, z, k, e, states, components)
+        observe_rows(P, B, S, H, h * m, H_T, h * n, R, r, states, components)
         for c in range(m):
-            seen = e[0, c] if abs(e[0, c]) < np.inf else np.nan
-            residual[k, c] = seen
-            nis[k, c] = seen * seen / S[c, c]
+            variance[0, c] = S[c, c]
+        note_row(e, variance, residual, nis, k, components)
         far = weigh_rows(e, S, R, r, used, root, loss, by_noise, components)
         for c in range(m):
             w = used[0, c] / (root[0, c] * root[0, c])
             weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
-        eliminate_rows(x, e, B, S, L, used, states, components)
+        eliminate_rows(B, S, L, used, states, components)
+        absorb_rows(x, 0, e, B, S, used, states, components)
         if far:
-            _joseph(P, A, B, L, used, root, H, h * m, R, r, states, components)
+            joseph_rows(P, A, B, L, used, root, H, h * m, R, r, states, components)
         else:
             for c in range(m):
                 for i in range(n):
@@ -322,6 +117,64 @@ def run(
             nis[t],
             weights[t],
         )
+
+
+@threaded_kernel
+def follow(
+    model: LinearModel,
+    loss: Loss,
+    covariance: FloatArray,
+    first: FloatArray,
+    start: FloatArray,
+    z: FloatArray,
+    mean: FloatArray,
+    residual: FloatArray,
+    nis: FloatArray,
+) -> None:
+    """Filter T series whose covariances are known, the same for all: the gains serve all of them.
+
+    Nothing is weighed, and all have the same gaps. First (n, n) and then (N·n, n) covariances;
+    start (T, n), and the epochs of all series one after the other: z (T·N, m), mean (T·N, n).
+    """
+    states, components = model.states, model.components
+    n, m = width(states), width(components)
+    T, N = start.shape[0], covariance.shape[0] // n
+    e, variance = scratch(ONE, components), scratch(ONE, components)
+    used, root = scratch(ONE, components), scratch(ONE, components)
+    P, A = scratch(states, states), scratch(states, states)
+    B, S, L = (
+        scratch(components, states),
+        scratch(components, components),
+        scratch(components, components),
+    )
+    F, F_T, Q, H, H_T, R = model.F, model.F_T, model.Q, model.H, model.H_T, model.R
+    f_step, q_step = n * (F.shape[0] > n), n * (Q.shape[0] > n)
+    h_step, r_step = 1 * (H.shape[0] > m), m * (R.shape[0] > m)
+    for k in range(N):
+        f, q, h, r = f_step * k, q_step * k, h_step * k, r_step * k
+        for i in range(n):
+            if k == 0:
+                copy_row(P, i, first, i, states)
+            else:
+                copy_row(P, i, covariance, (k - 1) * n + i, states)
+        predict_rows(P, A, F, F_T, f, Q, q, states)
+        observe_rows(P, B, S, H, h * m, H_T, h * n, R, r, states, components)
+        for c in range(m):
+            variance[0, c] = S[c, c]
+        copy_row(e, 0, z, k, components)
+        weigh_rows(e, S, R, r, used, root, loss, False, components)
+        eliminate_rows(B, S, L, used, states, components)
+        for t in range(T):
+            row = t * N + k
+            if k == 0:
+                move_row(start, t, F_T, f, mean, row, states)
+            else:
+                move_row(mean, row - 1, F_T, f, mean, row, states)
+            innovate_row(mean, row, H_T, h * n, z, row, e, states, components)
+            note_row(e, variance, residual, nis, row, components)
+            for c in range(m):
+                e[0, c] = e[0, c] if abs(e[0, c]) < np.inf else 0.0
+            absorb_rows(mean, row, e, B, S, used, states, components)
 
 
 @kernel

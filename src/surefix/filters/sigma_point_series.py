@@ -20,7 +20,14 @@ from numpy.typing import ArrayLike
 from surefix.errors import OptionsError
 from surefix.filters.kalman import Gaussian
 from surefix.filters.linear import LinearTrack, linear_model
-from surefix.filters.linear_step import LinearModel, eliminate_rows, predict_rows, weigh_rows
+from surefix.filters.linear_parts import (
+    LinearModel,
+    absorb_rows,
+    eliminate_rows,
+    move_row,
+    predict_rows,
+    weigh_rows,
+)
 from surefix.filters.sigma_point import Spread
 from surefix.jit import inlined, kernel
 from surefix.models.sights import BEARING, COMPONENT, sight_row
@@ -201,7 +208,9 @@ def _run(
         for j in range(moving):
             signs[j, p] = 1.0 if p == 1 + j else -1.0 if p == 1 + moving + j else 0.0
     for k in range(z.shape[0]):
-        predict_rows(x, P, y, A, F, F_T, f_step * k, Q, q_step * k, states)
+        move_row(x, 0, F_T, f_step * k, y, 0, states)
+        copy_row(x, 0, y, 0, states)
+        predict_rows(P, A, F, F_T, f_step * k, Q, q_step * k, states)
         _columns(P, L, y, moving, states)
         _points(x, L, gamma, moving, ones, signs, X, states, points)
         r, a = r_step * k, a_step * k
@@ -231,7 +240,8 @@ def _run(
         for c in range(m):
             w = used[0, c] / (root[0, c] * root[0, c])
             weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
-        eliminate_rows(x, e, B, S, T, used, states, components)
+        eliminate_rows(B, S, T, used, states, components)
+        absorb_rows(x, 0, e, B, S, used, states, components)
         for c in range(m):
             for i in range(n):
                 add_row(P, i, -B[c, i] * used[0, c], B, c, states)
