@@ -35,6 +35,7 @@ from surefix.filters.hypothesis_axis import (
 )
 from surefix.filters.hypothesis_density import log_sum, wrapped
 from surefix.filters.hypothesis_drags import CERTAIN, drag_axis, make_certain
+from surefix.filters.hypothesis_scratch import Scratch
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import BoolArray, FloatArray, IntArray
@@ -45,6 +46,8 @@ _FAR = 10.0  # nats below the best at which a hypothesis is dropped
 _NOUGHT = -37.0  # nats: what is less likely than the best by that adds nothing to a sum
 _AXES = 7  # bits of a code
 _ALIKE = 0.01  # squared distance in standard deviations below which two hypotheses are one
+_NARROW, _WIDE = 0.95, 1.05  # factors between which their variances are the same
+_SURELY = 1.0 + 1e-9  # what is larger by that is so after any rounding
 
 
 @inner
@@ -264,27 +267,42 @@ def apply_position(
 
 
 @inner
-def merge(motion: Motion, bank: Bank, place: IntArray, keep: BoolArray, key: FloatArray) -> None:
+def merge(motion: Motion, bank: Bank, place: IntArray, work: Scratch) -> None:
     """Let the lesser of two hypotheses that say the same add its weight to the greater.
 
-    ``keep`` (k,) becomes which are left; ``key`` (k,) is scratch.
+    ``work.keep`` becomes which are left. Most pairs are far apart on some axis. That is found for
+    all at once, free rows too, as the machine compares several numbers in one step.
     """
+    keep, apart = work.keep, work.apart
     count = bank.number[0]
-    for i in range(count):
-        keep[i] = True
-        key[i] = bank.mean[place[i], 0, 0]
+    for i in range(len(keep)):
+        keep[i] = i < count
+        for a in range(motion.axes):
+            work.middle[a, i] = bank.mean[place[i], a, 0]
+            work.width[a, i] = bank.covariance[place[i], a, 0, 0]
     for first in range(count):
         if not keep[first]:
             continue
-        limit = _ALIKE * bank.covariance[place[first], 0, 0, 0]
-        limit = limit if limit > 0.0 else np.inf
+        for i in range(len(keep)):
+            apart[i] = not keep[i]
+        for a in range(motion.axes):
+            _part(work.middle[a], work.width[a], first, apart)
         for second in range(first + 1, count):
-            gap = key[first] - key[second]
-            if gap * gap > limit or not keep[second]:
-                continue
-            if _alike(motion, bank, place[first], place[second]):
+            if not apart[second] and _alike(motion, bank, place[first], place[second]):
                 keep[second] = False
                 bank.weight[first] = log_sum(bank.weight[first], bank.weight[second])
+
+
+@inner
+def _part(middle: FloatArray, width: FloatArray, first: int, apart: BoolArray) -> None:
+    """Mark the hypotheses whose positions (k,) on an axis, or their variances, are not alike."""
+    m, P = middle[first], width[first]
+    limit, low, high = _ALIKE * _SURELY * P, _NARROW * P, _WIDE * P
+    if not P > 0.0:
+        limit, low, high = np.inf, -np.inf, np.inf
+    for i in range(len(apart)):
+        gap = m - middle[i]
+        apart[i] |= (gap * gap > limit) | (width[i] > high) | (width[i] < low)
 
 
 @lean_helper
@@ -305,7 +323,7 @@ def _alike(motion: Motion, bank: Bank, i: int, j: int) -> bool:
             P = bank.covariance[i, a, s, s]
             if P > 0.0:
                 other = bank.covariance[j, a, s, s]
-                if other > 1.05 * P or other < 0.95 * P:
+                if other > _WIDE * P or other < _NARROW * P:
                     return False
                 distance += gap * gap / P
         if running:

@@ -27,12 +27,14 @@ class Scratch(NamedTuple):
         (k,) the same of the hypotheses that the candidates come from.
     claims, spare, row
         (k,) how many come from each, rows that are free, and rows that are given.
-    keep
-        (k,) hypotheses left by merging.
+    keep, apart
+        (k,) hypotheses left by merging, and those that one of them is not merged with.
     r, noise
         (2·axes,) variances of the components, and (axes,) their share of those of innovations.
     share
         (k,) probabilities.
+    middle, width
+        (axes, k) positions and their variances.
     parts
         (4, 3) terms of the densities of each axis.
     """
@@ -49,9 +51,12 @@ class Scratch(NamedTuple):
     spare: IntArray
     row: IntArray
     keep: BoolArray
+    apart: BoolArray
     r: FloatArray
     noise: FloatArray
     share: FloatArray
+    middle: FloatArray
+    width: FloatArray
     parts: FloatArray
 
 
@@ -70,9 +75,12 @@ def scratch_for(axes: int, most: int) -> Scratch:
         rows_of(most),
         rows_of(most),
         np.empty(most, np.bool_),
+        np.empty(most, np.bool_),
         np.empty(2 * axes),
         np.zeros(axes),
         np.empty(most),
+        np.empty((axes, most)),
+        np.empty((axes, most)),
         np.empty((4, 3)),
     )
 

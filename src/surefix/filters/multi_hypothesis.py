@@ -136,11 +136,10 @@ def _close_ranks(
     motion: Motion, bank: Bank, place: IntArray, work: Scratch, origin: IntArray, said: IntArray
 ) -> None:
     """Merge what is alike and close the gaps."""
-    keep = work.keep
-    merge(motion, bank, place, keep, work.share)
+    merge(motion, bank, place, work)
     left = 0
     for i in range(bank.number[0]):
-        if not keep[i]:
+        if not work.keep[i]:
             continue
         place[left], place[i] = place[i], place[left]
         bank.weight[left] = bank.weight[i]
