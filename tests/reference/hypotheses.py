@@ -27,8 +27,6 @@ STRANGE = 16.0
 CONFIRMED = 3
 ROW = 2  # wrong fixes on end after which the next is likely to be wrong
 PREFERS = 3.0
-ALIKE = 0.7
-SLIPPED, LEARNS = 1.5, 0.5
 PATIENCE, AIDED = 1.25, 5.0
 ANEW = 0.1
 HASTE = 2.0
@@ -52,7 +50,7 @@ def enumerate_accounts(motion, prior, epochs, far=np.inf, alike=0.0, first=None)
     are fixed beforehand are not.
     """
     d, none = motion.axes, ((),) * motion.axes
-    empty = Account(0.0, none, (0,) * d, none, (None,) * d, (False,) * d, slip=(0.0,) * d)
+    empty = Account(0.0, none, (0,) * d, none, (None,) * d, (False,) * d, slip=((0.0, 0.0),) * d)
     empty = empty._replace(
         lost=((np.nan, 0),) * d,
         rate=((0, prior.sigma_velocity),) * d,
@@ -127,10 +125,15 @@ def _same(figures, offsets, others, their_offsets, alike):
     return ((other - m) ** 2 / P).sum() <= alike and (np.abs(ratio - 1.0) <= 0.05).all()
 
 
-def _slipped(motion, account, a, time, sensor, r):
-    """Variance of how a wrong velocity differs from what it was off by before."""
+def _slipped(motion, account, known, a, time, sensor):
+    """What velocities that are off alike would show by now, and its variance."""
     gap = time - account.heard.get((sensor, a), time)
-    return 2.0 * motion.density[a] * gap * reach(motion.order, 1, gap) ** 2 + SLIPPED * r
+    level, variance = account.slip[a]
+    variance += motion.density[a] * gap * reach(motion.order, 1, gap) ** 2
+    if motion.order > 2:
+        m, P = known[a]
+        return level + gap * m[2], variance + gap**2 * P[2, 2]
+    return level, variance
 
 
 def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
@@ -143,20 +146,24 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     poor = sum(normal(nu[a], S[a] + (POOR - 1.0) * r[d + a]) for a in seen) + np.log(prior.poor)
     wide = np.array([prior.spread[d + a] ** 2 + S[a] for a in seen])
     outside = cauchy(np.array([nu[a] for a in seen]) ** 2 / wide, wide)
-    wrong, same = prior.velocity, 1.0
+    wrong, same = prior.velocity, False
+    level = {a: _slipped(motion, account, known, a, time, sensor) for a in seen}
     if sensor in account.faulty:
         wrong = prior.again
-        off = {a: nu[a] - account.slip[a] for a in seen}
-        change = {a: _slipped(motion, account, a, time, sensor, r[d + a]) for a in seen}
-        alike = sum(normal(off[a], change[a]) for a in seen)
-        if sum(off[a] ** 2 / change[a] for a in seen) < GROSS:
-            same = LEARNS
-        outside = np.logaddexp(outside + np.log(1.0 - ALIKE), alike + np.log(ALIKE))
+        off = {a: z[d + a] - level[a][0] for a in seen}
+        change = {a: level[a][1] + r[d + a] for a in seen}
+        alike = sum(normal(off[a], change[a]) for a in seen) + np.log(prior.alike)
+        same = sum(off[a] ** 2 / change[a] for a in seen) < GROSS
+        outside = np.logaddexp(outside + np.log(1.0 - prior.alike), alike)
     rows, slip = account.rows, account.slip
     for a in seen:
         variance = r[d + a] * (POOR if poor > usual else 1.0)
         rows = put(rows, a, (*rows[a], (step, 1, (), z[d + a], variance)))
-        slip = put(slip, a, slip[a] + same * (nu[a] - slip[a]))
+        mean, total = level[a] if same else (z[d + a], np.inf)
+        gain = 1.0 / (1.0 + r[d + a] / total)
+        slip = put(slip, a, (mean + gain * (z[d + a] - mean), gain * r[d + a]))
+    for a in set(range(d)) - set(seen) if not same else ():
+        slip = put(slip, a, (known[a][0][1], known[a][1][1, 1] + prior.spread[d + a] ** 2))
     gain = np.logaddexp(usual, poor) + np.log(1.0 - wrong)
     faulty, touched = account.faulty, account.touched
     for a in seen:

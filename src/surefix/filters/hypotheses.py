@@ -82,7 +82,7 @@ class Prior(NamedTuple):
     manoeuvre
         Probability that the highest rate of the model changes at once.
     velocity, again
-        Probability that a velocity is wrong, and that it is if the last one was.
+        Probability that a velocity is wrong, and that it is if the last one was; learnt.
     spread
         (2·axes,) scale of the gross errors per component, m and m/s.
     sigma_velocity
@@ -101,6 +101,8 @@ class Prior(NamedTuple):
     small
         How many of the errors of fixes there are of less than 6 σ that a Cauchy density has
         there, at most 1; learnt.
+    alike
+        Probability that a wrong velocity after a wrong one is off as that one was; learnt.
     """
 
     isolated: float
@@ -119,6 +121,7 @@ class Prior(NamedTuple):
     drag: float = 0.0
     steady: float = 0.0
     small: float = 1.0
+    alike: float = 0.7
 
 
 class Bank(NamedTuple):
@@ -155,7 +158,7 @@ class Bank(NamedTuple):
     faulty
         (k,) bit mask of the sensors whose last velocity was wrong.
     slip
-        (k, axes) m/s, how much the last wrong velocity was off: the next is often off alike.
+        (k, axes, 2) what wrong velocities that are off alike show, m/s, and its variance.
     lost, missed
         (k, axes) how many fixes were left out since the last one used, and the first of them, s,
         which means nothing while there are none.
@@ -271,7 +274,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full(most, np.nan),
         np.zeros(most, np.int64),
         np.zeros(most, np.int64),
-        np.zeros((most, d)),
+        np.zeros((most, d, 2)),
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
         np.full((most, d), np.nan),

@@ -59,7 +59,6 @@ CONFIRMED = 3
 """Fixes of a run before it can be called a jump."""
 ROW = 2
 """Fixes on end that are wrong by themselves, after which the next is likely to be."""
-_ALIKE = 0.7  # probability that a wrong velocity is off as the one before was
 _STEPS = 40.0  # nats that a drag loses by a step of the velocities beside it
 _POORER = 1.0 / POOR_WEIGHT - 1.0  # what a poor observation adds, in variances
 _STRANGE = 16.0  # squared distance from which a manoeuvre is thought of
@@ -88,7 +87,7 @@ def velocity_branches(
 ) -> int:
     """Candidates of an observed velocity at ``time``: it belongs to the track, or not."""
     d, total = motion.axes, 0
-    alike_too, fresh = math.log(_ALIKE), math.log(1.0 - _ALIKE)
+    alike_too, fresh = math.log(prior.alike), math.log1p(-prior.alike)
     turned = math.log(prior.manoeuvre) if prior.manoeuvre > 0.0 else -np.inf
     rarely = math.log(prior.velocity)
     mostly = math.log1p(-prior.velocity)
@@ -126,8 +125,8 @@ def velocity_branches(
             for a in range(d):
                 c = d + a
                 if not math.isnan(z[c]):
-                    change = z[c] - bank.mean[k, a, 1] - bank.slip[k, a]
-                    alike += log_normal(change, slipped(motion, bank, a, time, sensor, variance[c]))
+                    level, P = slipped(motion, bank, k, a, time, sensor)
+                    alike += log_normal(z[c] - level, P + variance[c])
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
             inside, poorer = usual_or_poor(distance, volume, near, wider, seen, prior.poor)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from surefix.filters.hypotheses import Bank
+from surefix.filters.hypotheses import Bank, Prior
 from surefix.filters.hypothesis_axis import agility, reach
 from surefix.filters.hypothesis_density import wild_product, wrapped
 from surefix.filters.records import Motion
@@ -15,9 +15,7 @@ from surefix.types import FloatArray
 
 __all__ = ["learn_slip", "slipped", "swift"]
 
-_SLIPPED = 1.5  # variance of a velocity beside what it was off by in the mean, in its own
-_LEARNS = 0.5  # of how much a velocity is off by a further one that is off alike, …
-_ALIKE = 36.0  # … within this squared distance
+_ALIKE = 36.0  # squared distance within which a wrong velocity is off as the one before was
 
 
 @inner
@@ -34,15 +32,22 @@ def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
 
 
 @inner
-def slipped(motion: Motion, bank: Bank, a: int, time: float, sensor: int, r: float) -> float:
-    """Variance of how a wrong velocity of axis a differs from what it was off by before.
+def slipped(
+    motion: Motion, bank: Bank, k: int, a: int, time: float, sensor: int
+) -> tuple[float, float]:
+    """What velocities of axis a that are off alike would show now, and its variance.
 
-    What the track's own velocity is off by is the same in both, but for what it changed meanwhile.
+    It is the track's own velocity and what they are off by, and changes as the former does. It is
+    known from them alone, whatever fixes say meanwhile of how much of it is which.
     """
     gap = _since(bank.heard[sensor, motion.axes + a], time)
     change = reach(motion.order, 1, gap)
     q: float = motion.density[a]
-    return 2.0 * q * gap * change * change + _SLIPPED * r
+    level, variance = bank.slip[k, a, 0], bank.slip[k, a, 1] + q * gap * change * change
+    if motion.order > 2:
+        level += gap * bank.mean[k, a, 2]
+        variance += gap * gap * bank.covariance[k, a, 2, 2]
+    return level, variance
 
 
 @lean_helper
@@ -74,6 +79,7 @@ def swift(
 @lean_helper
 def learn_slip(
     motion: Motion,
+    prior: Prior,
     bank: Bank,
     k: int,
     z: FloatArray,
@@ -81,14 +87,21 @@ def learn_slip(
     time: float,
     sensor: int,
 ) -> None:
-    """Remember what a wrong velocity of hypothesis k is off by, in the mean of those alike."""
+    """Remember what wrong velocities of hypothesis k show, in the mean of those off alike."""
     d, distance = motion.axes, 0.0
     for a in range(d):
         if not math.isnan(z[d + a]):
-            off = z[d + a] - bank.mean[k, a, 1] - bank.slip[k, a]
-            distance += off * off / slipped(motion, bank, a, time, sensor, variance[d + a])
+            level, P = slipped(motion, bank, k, a, time, sensor)
+            distance += (z[d + a] - level) ** 2 / (P + variance[d + a])
     alike = (bank.faulty[k] >> sensor) & 1 != 0 and distance < _ALIKE
     for a in range(d):
         if not math.isnan(z[d + a]):
-            off = z[d + a] - bank.mean[k, a, 1] - bank.slip[k, a]
-            bank.slip[k, a] += _LEARNS * off if alike else off
+            level, P = slipped(motion, bank, k, a, time, sensor)
+            r = variance[d + a]
+            gain = P / (P + r) if alike else 1.0
+            bank.slip[k, a, 0] = level + gain * (z[d + a] - level)
+            bank.slip[k, a, 1] = gain * r
+        elif not alike:
+            spread = prior.spread[d + a]
+            bank.slip[k, a, 0] = bank.mean[k, a, 1]
+            bank.slip[k, a, 1] = bank.covariance[k, a, 1, 1] + spread * spread

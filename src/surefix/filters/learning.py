@@ -149,7 +149,7 @@ def learn(
         said, weight, smoothed = decide_offline(motion, prior, epochs)
         residual, variance = deleted_residuals(motion, epochs, weight, smoothed)
         supposed_before, before = prior, figures
-        prior = counted(prior, said, residual, variance, epochs.variance)
+        prior = counted(prior, said, residual, variance, epochs.variance, sample.sensor)
         figures = _likeliest(sample, said, prior, given, before, least, motion)
         if noisy is None:
             noisy = np.sqrt(np.maximum(figures.velocity**2 - floor[1] ** 2, 0.0))

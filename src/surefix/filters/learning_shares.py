@@ -9,7 +9,7 @@ import numpy as np
 from surefix.filters.hypotheses import POOR_WEIGHT, Prior
 from surefix.filters.hypothesis_branches import GROSS
 from surefix.filters.hypothesis_trail import Decisions
-from surefix.types import BoolArray, FloatArray
+from surefix.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["counted"]
 
@@ -20,6 +20,8 @@ _SHARES = {
     "manoeuvre": (0.02, 100.0),
     "row": (1.0, 3.0),
     "velocity": (2.0, 100.0),
+    "again": (9.0, 10.0),
+    "alike": (7.0, 10.0),
 }  # prior counts: wrong, and all
 _FEW = 5  # gross errors whose scale is believed
 _LEAST_WILD = 5.0  # scale of gross errors at least, in standard deviations
@@ -34,6 +36,7 @@ def counted(
     residual: FloatArray,
     variance: FloatArray,
     noise: FloatArray,
+    sensor: IntArray,
 ) -> Prior:
     """Shares and sizes of the gross errors among what was decided.
 
@@ -47,15 +50,15 @@ def counted(
         (n, 2·axes) deleted residuals, and their variances; NaN where not observed.
     noise
         (n, 2·axes) variances of the observations themselves.
+    sensor
+        (n,) whose they are.
     """
     axes = residual.shape[1] // 2
-    moving = np.isfinite(residual[:, axes:]).any(axis=1)
+    prior = _with_slips(prior, said, residual, variance, sensor)
     residual, variance, noise = (part[:, :axes] for part in (residual, variance, noise))
     seen = np.isfinite(residual)
     if not seen.any():
         return prior
-    slips = (said.fixed[moving, axes:] == 0.0).all(axis=1)
-    prior = prior._replace(velocity=_share("velocity", _begin(slips), len(slips)))
     told = _with_shares(prior, said, residual, math.sqrt(float(np.median(noise[seen]))))
     whole = seen.any(axis=1) & ~((said.fixed[:, :axes] > 0.0) & seen).any(axis=1)
     return _with_small(told, whole & (said.run == 0), residual, variance, noise)
@@ -66,9 +69,29 @@ def _share(name: str, count: int, among: int) -> float:
     return float((count + wrong) / (among + every))
 
 
-def _begin(flags: BoolArray) -> int:
-    """How many stretches there are in which a flag is raised."""
-    return int((np.diff(flags.astype(np.int64), prepend=0) > 0).sum())
+def _with_slips(
+    prior: Prior, said: Decisions, residual: FloatArray, variance: FloatArray, sensor: IntArray
+) -> Prior:
+    """How often velocities begin to be wrong, go on so, and are then off as the one before was."""
+    axes = residual.shape[1] // 2
+    e, S = residual[:, axes:], variance[:, axes:]
+    moving = np.isfinite(e).any(axis=1)
+    begin = after = again = alike = 0
+    for own in np.unique(sensor[moving]):
+        rows = np.flatnonzero(moving & (sensor == own))
+        slips = (said.fixed[rows, axes:] == 0.0).all(axis=1)
+        both = slips[1:] & slips[:-1]
+        pairs = rows[1:][both], rows[:-1][both]
+        change = (e[pairs[0]] - e[pairs[1]]) ** 2 / (S[pairs[0]] + S[pairs[1]])
+        begin += int((np.diff(slips.astype(np.int64), prepend=0) > 0).sum())
+        after += int(slips[:-1].sum())
+        again += len(change)
+        alike += int((np.nansum(change, axis=1) < GROSS).sum())
+    return prior._replace(
+        velocity=_share("velocity", begin, int(moving.sum())),
+        again=_share("again", again, after),
+        alike=_share("alike", alike, again),
+    )
 
 
 def _with_shares(prior: Prior, said: Decisions, residual: FloatArray, sigma: float) -> Prior:

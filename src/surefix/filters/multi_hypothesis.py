@@ -71,6 +71,7 @@ _BY_ROW = tuple(set(Bank._fields) - _WHOLE)
 @inner
 def _apply_velocity(
     motion: Motion,
+    prior: Prior,
     bank: Bank,
     i: int,
     z: FloatArray,
@@ -82,7 +83,7 @@ def _apply_velocity(
     """Do to hypothesis i what its candidate said."""
     d, bit = motion.axes, 1 << sensor
     if code & VELOCITY_OUT:
-        learn_slip(motion, bank, i, z, r, time, sensor)
+        learn_slip(motion, prior, bank, i, z, r, time, sensor)
         bank.faulty[i] |= bit
         return
     bank.faulty[i] &= ~bit
@@ -307,7 +308,7 @@ def _run(
                 if stage == 1:
                     apply_position(motion, prior, bank, place[i], z, r, what, time, sensor, speed)
                 else:
-                    _apply_velocity(motion, bank, place[i], z, r, what, time, sensor)
+                    _apply_velocity(motion, prior, bank, place[i], z, r, what, time, sensor)
         _commit_lasting(motion, prior, bank, place, time, said)
         if bank.number[0] > 1:
             _close_ranks(motion, bank, place, work, work.origin, said)
