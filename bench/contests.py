@@ -103,7 +103,7 @@ def sights() -> Contest:
     )
     contest = Contest("Unscented filter, 3 ranges and bearings", "µs an epoch", 1e6, [ours])
     contest.aims = {"fastest": 1 / 50}
-    _add(contest, "kalman-py (JAX)", sight_peers.kalman_py, problem, 500)
+    _add(contest, "kalman-py (JAX)", sight_peers.kalman_py, problem)
     _add(contest, "fast-kalman", sight_peers.fast_kalman, problem, FEW)
     _add(contest, "FilterPy", sight_peers.filterpy, problem, FEW)
     return contest

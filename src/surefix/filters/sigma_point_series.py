@@ -6,8 +6,9 @@ for which the unscented transform is exact and needs no points. Points stand on 
 lower Cholesky factor, whose later columns do not move the position: sights of the position alone
 are evaluated at 2d + 1 points of d axes, whatever the number of states.
 
-The state is carried as a covariance. Where a prior is vaguer than the sights by six orders of
-magnitude, take the square-root form of `surefix.filters.sigma_point`.
+What moves is carried as the factor that the points stand on, and only the rest as a covariance:
+where variances of a prior are 10¹² those of the sights, nine digits remain. Beyond that take the
+square-root form of `surefix.filters.sigma_point`.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def filter_sights(
     _run(
         model,
         loss,
-        bool((np.tile(np.eye(m), (len(model.R) // m, 1)) * model.R != model.R).any()),
+        int(np.count_nonzero(model.R)) > len(model.R),
         codes,
         np.ascontiguousarray(places).reshape(-1, d),
         size_of(moving),
@@ -181,7 +182,6 @@ def _points(
     ones: FloatArray,
     signs: FloatArray,
     X: FloatArray,
-    states: Size,
     moving: Size,
     points: Size,
 ) -> None:
@@ -278,7 +278,7 @@ def _run(
         copy_row(x, 0, y, 0, states)
         predict_rows(P, A, F, F_T, f_step * k, Q, q_step * k, states)
         _columns(P, L, y, pivots, keep, states, moving)
-        _points(x, L, gamma, ones, signs, X, states, moving, points)
+        _points(x, L, gamma, ones, signs, X, moving, points)
         for c in range(m):
             sight_row(kind[c], anchors, a + c, X, ones, off, Y, c, points)
         for c in range(m):
