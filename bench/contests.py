@@ -49,7 +49,8 @@ def all_contests() -> Iterator[Callable[[], Contest]]:
         yield partial(medians, window)
     for window in (5, 39, 301):
         yield partial(identifier, window)
-    yield tracks
+    yield partial(tracks, gaps=False)
+    yield partial(tracks, gaps=True)
     yield track_filter
     yield partial(hypotheses, aided=True)
     yield partial(hypotheses, aided=False)
@@ -103,7 +104,7 @@ def sights() -> Contest:
     )
     contest = Contest("Unscented filter, 3 ranges and bearings", "µs an epoch", 1e6, [ours])
     contest.aims = {"fastest": 1 / 50}
-    _add(contest, "kalman-py (JAX)", sight_peers.kalman_py, problem, 500)
+    _add(contest, "kalman-py (JAX)", sight_peers.kalman_py, problem)
     _add(contest, "fast-kalman", sight_peers.fast_kalman, problem, FEW)
     _add(contest, "FilterPy", sight_peers.filterpy, problem, FEW)
     return contest
@@ -196,20 +197,23 @@ def identifier(window: int) -> Contest:
     return contest
 
 
-def tracks() -> Contest:
-    """Many tracks of one model at once, on all cores."""
+def tracks(*, gaps: bool) -> Contest:
+    """Many tracks of one model at once, on all cores; complete, or each with gaps of its own."""
     problem = constant_velocity(6, LENGTH)
     rng = np.random.default_rng(3)
     z = problem.z + 0.1 * rng.standard_normal((TRACKS, LENGTH, 6))
+    if gaps:
+        z[rng.random((TRACKS, LENGTH)) < 0.05] = np.nan
     first = gaussian(problem.mean, problem.covariance)
     model = (problem.F, problem.Q, problem.H, problem.R)
     ours = Contestant("surefix", 1, lambda: filter_linear(first, z, *model)[:2], _some)
-    contest = Contest(f"{TRACKS:,} tracks of {LENGTH} epochs, 6 states", "s", 1.0, [ours])
-    contest.aims = {"dynamax (vmap, JAX)": 1.0, "simdkalman": 0.1}
-    for name, peer in (
-        ("dynamax (vmap, JAX)", linear_peers.dynamax_tracks),
-        ("simdkalman", linear_peers.simdkalman_tracks),
-    ):
+    name = f"{TRACKS:,} tracks of {LENGTH} epochs, 6 states{', 5 % missing' if gaps else ''}"
+    contest = Contest(name, "s", 1.0, [ours])
+    peers = {"simdkalman": linear_peers.simdkalman_tracks}
+    if not gaps:  # dynamax knows none
+        peers["dynamax (vmap, JAX)"] = linear_peers.dynamax_tracks
+        contest.aims = {"dynamax (vmap, JAX)": 1.0, "simdkalman": 0.1}
+    for name, peer in peers.items():
         try:
             contest.contestants.append(Contestant(name, 1, peer(problem, z), _some))
         except ImportError as error:

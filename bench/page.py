@@ -39,7 +39,8 @@ NOTES = """
 - **Tracks**: means and covariances of all tracks. Without weights and with the same gaps all
   tracks have one covariance. Ours finds that out from the observations, computes it once and gives
   one array that is seen by every track; `vmap` computes it once, too, and writes it for each. What
-  the system takes to find the memory is a large part of the time.
+  the system takes to find the memory is a large part of the time. Where each track has gaps of its
+  own, each has covariances of its own; dynamax knows no gaps.
 - **Hampel**: the peer computes in single precision.
 - **Hypotheses** and the filter and smoother of `surefix clean` have no peer that does the same.
 """

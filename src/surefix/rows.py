@@ -297,7 +297,7 @@ def _dot_rows(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     a, i, b, k, size = signature.args
     one = _start(context, builder, a, args[0], i, args[1], size, args[4])
     other = _start(context, builder, b, args[2], k, args[3], size, args[4])
-    zero = ir.Constant(ir.DoubleType(), 0.0)
+    zero = ir.Constant(ir.DoubleType(), -0.0)  # adds nothing at all
     if isinstance(size, types.BaseTuple):
         n = len(size)
         x, y = (load(builder, as_vector(builder, each, n)) for each in (one, other))
@@ -333,10 +333,12 @@ def _root_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 def _turn_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds, given = signature.args, args
     period = context.cast(builder, given[2], kinds[2], types.float64)
+    one = ir.Constant(ir.DoubleType(), 1.0)
 
     def turn(a: Any) -> Any:
         P = spread_out(builder, period, a.type)
-        return builder.fsub(a, builder.fmul(P, call_vector(builder, "rint", builder.fdiv(a, P))))
+        turns = builder.fmul(a, spread_out(builder, builder.fdiv(one, period), a.type))
+        return builder.fsub(a, builder.fmul(P, call_vector(builder, "rint", turns)))
 
     kept = (0, 1, 3)
     return _each(context, builder, [kinds[i] for i in kept], [given[i] for i in kept], turn)

@@ -60,16 +60,26 @@ def arctangent(builder: Any, y: Any, x: Any) -> Any:
     nothing = builder.fcmp_ordered("==", under, zero)
     t = builder.fdiv(above, builder.select(nothing, constant(kind, 1.0), under))
     z = builder.fmul(t, t)
-    series = constant(kind, _ARCTANGENT[-1])
-    for each in _ARCTANGENT[-2::-1]:
-        product = builder.fmul(series, z, flags=CONTRACT)
-        series = builder.fadd(product, constant(kind, each), flags=CONTRACT)
-    angle = builder.fmul(t, series)
+    angle = builder.fmul(t, _polynomial(builder, z, _ARCTANGENT))
     angle = builder.fadd(angle, builder.select(wide, constant(kind, 0.25 * math.pi), zero))
     angle = builder.select(steep, builder.fsub(constant(kind, 0.5 * math.pi), angle), angle)
     behind = builder.fcmp_ordered("<", x, zero)
     angle = builder.select(behind, builder.fsub(constant(kind, math.pi), angle), angle)
     return call_vector(builder, "copysign", angle, y)
+
+
+def _polynomial(builder: Any, z: Any, coefficients: tuple[float, ...]) -> Any:
+    """Sum of c_i zⁱ: in pairs, then pairs of pairs (Estrin), none of which waits for another."""
+    terms = [constant(z.type, each) for each in coefficients]
+    while len(terms) > 1:
+        odd = [builder.fmul(each, z, flags=CONTRACT) for each in terms[1::2]]
+        pairs = [
+            builder.fadd(low, high, flags=CONTRACT)
+            for low, high in zip(terms[::2], odd, strict=False)
+        ]
+        terms = pairs + terms[2 * len(odd) :]
+        z = builder.fmul(z, z)
+    return terms[0]
 
 
 def call_vector(builder: Any, name: str, *args: Any) -> Any:

@@ -5,6 +5,7 @@ import pytest
 
 from reference import sigma_point as textbook
 from surefix.errors import OptionsError
+from surefix.filters import kalman
 from surefix.filters.kalman import gaussian
 from surefix.filters.sigma_point import Spread
 from surefix.filters.sigma_point_series import filter_sights
@@ -71,6 +72,49 @@ def test_series_is_the_textbook(name, spread):
         np.testing.assert_allclose(found.mean[k], m, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found.covariance[k], P, rtol=1e-9, atol=1e-9)
     assert np.array_equal(np.isnan(found.weight), np.isnan(z))
+
+
+@pytest.mark.parametrize("name", ["ranges and bearings", "in space"])
+def test_errors_of_sights_may_go_together(name):
+    """Correlated noise with gaps and weights: the textbook's numbers on what is left."""
+    axes, kinds = KINDS[name]
+    x, z, F, Q, anchor, R = world(7, axes, kinds)
+    A = np.random.default_rng(7).standard_normal((len(kinds), len(kinds) + 2))
+    scale = np.sqrt(np.diag(R))
+    R = np.outer(scale, scale) * (np.eye(len(kinds)) + 0.3 * A @ A.T)
+    loss = loss_named("huber")
+    found = filter_sights(x, z, F, Q, kinds, anchor, R, loss)
+    m, P = x.mean, x.covariance
+    for k in range(len(z)):
+        m, P = textbook.predict(m, P, lambda p, F=F[k]: F @ p, Q[k])
+
+        def h(p, anchor=anchor[k]):
+            return np.array([value(c, a, p) for c, a in zip(kinds, anchor, strict=True)])
+
+        mean, S, _ = textbook.transform(m, P, h)
+        distance = np.abs(z[k] - mean) / np.sqrt(np.diag(S + R))
+        w = np.where(np.isnan(distance), 1.0, np.minimum(1.0, loss.k0 / distance))
+        np.testing.assert_allclose(found.weight[k], np.where(np.isnan(z[k]), np.nan, w), rtol=1e-8)
+        m, P = textbook.update(m, P, z[k], h, R / np.sqrt(np.outer(w, w)))
+        np.testing.assert_allclose(found.mean[k], m, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found.covariance[k], P, rtol=1e-9, atol=1e-9)
+    assert (found.weight < 1.0).any()
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e8, 1e12])
+def test_a_vague_prior_leaves_digits(ratio):
+    """Positions themselves as sights, for which the square-root filter knows the answer."""
+    rng = np.random.default_rng(5)
+    F, G = transition("cv", 2, 1.0), noise_factor("cv", 2, 1.0, 0.01)
+    R = np.array([[1.0, 0.3], [0.3, 2.0]]) * 1e-2
+    x = gaussian(np.zeros(4), np.diag([ratio, ratio, 1.0, 1.0]) * 1e-2)
+    z = rng.standard_normal((30, 2))
+    kinds = [COMPONENT, COMPONENT + 1]
+    found = filter_sights(x, z, F, G @ G.T, kinds, np.zeros((2, 2)), R)
+    for k, row in enumerate(z):
+        x, _ = kalman.update(kalman.predict(x, F, G @ G.T), row, np.eye(2, 4), R)
+        size = np.sqrt(np.outer(*[np.diag(x.covariance)] * 2))
+        assert (np.abs(found.covariance[k] - x.covariance) / size).max() < 1e-9
 
 
 def test_constant_acceleration_and_six_states():

@@ -286,11 +286,12 @@ def _check(stack: FloatArray, name: str, tolerance: float) -> None:
     """Refuse what is not finite, symmetric and positive (semi-)definite."""
     turned = np.swapaxes(stack, -1, -2)
     if np.isfinite(stack).all() and (np.abs(stack - turned) <= _ALIKE * np.abs(turned)).all():
-        size = stack.shape[-1]
-        largest = np.abs(np.einsum("kii->ki", stack)).max(axis=1, initial=0.0)
-        slack = tolerance * np.where(largest > 0.0, largest, 1.0)
+        if tolerance:
+            largest = np.abs(np.einsum("kii->ki", stack)).max(axis=1, initial=0.0)
+            slack = tolerance * np.where(largest > 0.0, largest, 1.0)
+            stack = stack + slack[:, None, None] * np.eye(stack.shape[-1])
         try:
-            np.linalg.cholesky(stack + slack[:, None, None] * np.eye(size))
+            np.linalg.cholesky(stack)
             return
         except np.linalg.LinAlgError:
             pass

@@ -161,34 +161,40 @@ def note_row(
 @inlined
 def weigh_rows(
     e: FloatArray,
+    variance: FloatArray,
     S: FloatArray,
     R: FloatArray,
     r: int,
     used: FloatArray,
     root: FloatArray,
+    weights: FloatArray,
+    k: int,
     loss: Loss,
     by_noise: bool,
     components: Size,
 ) -> bool:
     """Weigh the components, ``R̄_ij = R_ij / √(w_i w_j)``; whether some variance falls far.
 
-    ``used`` is 0 for what is left out, whose innovation becomes 0; ``root`` is ``1 / √w``.
+    ``used`` is 0 for what is left out, whose innovation becomes 0; ``root`` is ``1 / √w``, and w
+    itself, NaN where not observed, goes to ``weights[k]``. What R̄ has more than R is added to
+    ``S``; ``variance`` (1, m) is that of the innovations.
     """
     m = width(components)
     changed = far = False
     for c in range(m):
-        root[0, c] = 1.0
-        used[0, c] = 1.0
+        w = root[0, c] = used[0, c] = 1.0
         if not abs(e[0, c]) < np.inf:
             used[0, c] = e[0, c] = 0.0
+            w = np.nan
         elif loss.code != 0:
-            variance = R[r + c, c] if by_noise else S[c, c]
-            w = weight(abs(e[0, c]) / math.sqrt(variance), loss.code, loss.k0, loss.k1)
+            square = R[r + c, c] if by_noise else variance[0, c]
+            w = weight(abs(e[0, c]) / math.sqrt(square), loss.code, loss.k0, loss.k1)
             if w < 1.0:
                 changed = True
                 used[0, c] = 1.0 if w > 0.0 else 0.0
                 root[0, c] = 1.0 / math.sqrt(w) if w > 0.0 else 1.0
-        if S[c, c] > _FALL * R[r + c, c]:
+        weights[k, c] = w
+        if variance[0, c] > _FALL * R[r + c, c]:
             far = True
     if changed:
         for c in range(m):

@@ -5,8 +5,6 @@ Made of `surefix.filters.linear_parts`, which says how it is done.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from surefix.filters.linear_parts import (
@@ -71,10 +69,7 @@ def _series(
         for c in range(m):
             variance[0, c] = S[c, c]
         note_row(e, variance, residual, nis, k, components)
-        far = weigh_rows(e, S, R, r, used, root, loss, by_noise, components)
-        for c in range(m):
-            w = used[0, c] / (root[0, c] * root[0, c])
-            weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
+        far = weigh_rows(e, variance, S, R, r, used, root, weights, k, loss, by_noise, components)
         eliminate_rows(B, S, L, used, states, components)
         absorb_rows(x, 0, e, B, S, used, states, components)
         if far:
@@ -140,7 +135,11 @@ def follow(
     n, m = width(states), width(components)
     T, N = start.shape[0], covariance.shape[0] // n
     e, variance = scratch(ONE, components), scratch(ONE, components)
-    used, root = scratch(ONE, components), scratch(ONE, components)
+    used, root, weight = (
+        scratch(ONE, components),
+        scratch(ONE, components),
+        scratch(ONE, components),
+    )
     P, A = scratch(states, states), scratch(states, states)
     B, S, L = (
         scratch(components, states),
@@ -162,7 +161,7 @@ def follow(
         for c in range(m):
             variance[0, c] = S[c, c]
         copy_row(e, 0, z, k, components)
-        weigh_rows(e, S, R, r, used, root, loss, False, components)
+        weigh_rows(e, variance, S, R, r, used, root, weight, 0, loss, False, components)
         eliminate_rows(B, S, L, used, states, components)
         for t in range(T):
             row = t * N + k

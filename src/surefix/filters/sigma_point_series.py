@@ -6,8 +6,9 @@ for which the unscented transform is exact and needs no points. Points stand on 
 lower Cholesky factor, whose later columns do not move the position: sights of the position alone
 are evaluated at 2d + 1 points of d axes, whatever the number of states.
 
-The state is carried as a covariance. Where a prior is vaguer than the sights by six orders of
-magnitude, take the square-root form of `surefix.filters.sigma_point`.
+What moves is carried as the factor that the points stand on, and only the rest as a covariance:
+where variances of a prior are 10¹² those of the sights, nine digits remain. Beyond that take the
+square-root form of `surefix.filters.sigma_point`.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from surefix.filters.linear_parts import (
     absorb_rows,
     eliminate_rows,
     move_row,
+    note_row,
     predict_rows,
     weigh_rows,
 )
@@ -35,6 +37,7 @@ from surefix.robust.loss import Loss, loss_named
 from surefix.rows import (
     ONE,
     Size,
+    add_product,
     add_row,
     clear_row,
     copy_row,
@@ -121,9 +124,11 @@ def filter_sights(
     _run(
         model,
         loss,
+        int(np.count_nonzero(model.R)) > len(model.R),
         codes,
         np.ascontiguousarray(places).reshape(-1, d),
-        moving,
+        size_of(moving),
+        size_of(2 * moving),
         size_of(-(-(2 * moving + 1) // _LANES) * _LANES),
         (reach, at.beta - at.alpha**2),
         np.ascontiguousarray(x.mean[None], dtype=np.float64),
@@ -137,15 +142,36 @@ def filter_sights(
 
 
 @inlined
-def _columns(P: FloatArray, L: FloatArray, y: FloatArray, count: int, states: Size) -> None:
-    """Put the first columns of the Cholesky factor of P into the rows of L."""
-    for j in range(count):
-        copy_row(y, 0, P, j, states)
-        for k in range(j):
-            add_row(y, 0, -L[k, j], L, k, states)
-        pivot = y[0, j]
+def _columns(
+    P: FloatArray,
+    L: FloatArray,
+    y: FloatArray,
+    root: FloatArray,
+    keep: FloatArray,
+    states: Size,
+    moving: Size,
+) -> None:
+    """Put the first columns of the Cholesky factor of P into the rows of L, and take them from P.
+
+    ``keep`` (1, n) is 0 for the components that move: nothing is left of them, not even rounding.
+    """
+    k = width(moving)
+    for j in range(k):
+        copy_row(L, j, P, j, states)
+        for i in range(j):
+            add_row(L, j, -L[i, j] * root[0, i], L, i, states)
+        root[0, j] = 1.0 / L[j, j] if L[j, j] > 0.0 else 0.0
+    for j in range(k):
+        copy_row(y, 0, L, j, states)
         clear_row(L, j, states)
-        add_row(L, j, 1.0 / math.sqrt(pivot) if pivot > 0.0 else 0.0, y, 0, states)
+        add_row(L, j, math.sqrt(root[0, j]), y, 0, states)
+    for i in range(width(states)):
+        copy_row(y, 0, P, i, states)
+        clear_row(P, i, states)
+        if i >= k:
+            for j in range(k):
+                add_row(y, 0, -L[j, i], L, j, states)
+            add_product(P, i, keep, 0, y, 0, states)
 
 
 @inlined
@@ -153,28 +179,50 @@ def _points(
     x: FloatArray,
     L: FloatArray,
     gamma: float,
-    moving: int,
     ones: FloatArray,
     signs: FloatArray,
     X: FloatArray,
-    states: Size,
+    moving: Size,
     points: Size,
 ) -> None:
     """Put the points into the columns of X: the centre, then ± γ times each column of L."""
-    for i in range(width(states)):
+    for i in range(width(moving)):
         clear_row(X, i, points)
         add_row(X, i, x[0, i], ones, 0, points)
-        for j in range(moving):
+        for j in range(width(moving)):
             add_row(X, i, gamma * L[j, i], signs, j, points)
+
+
+@inlined
+def _latent(
+    reach: float, bend: float, signs: FloatArray, turn: FloatArray, moving: Size, points: Size
+) -> None:
+    """Make the signs of the points, and the map from their sights to the columns of `_run`.
+
+    Over the outer points, ``S − R = Σ (y yᵀ) / (2γ²) + (β − α²) d dᵀ`` with ``d = Σ y / (2γ²)``.
+    With ``o = (y₊ − y₋) / 2γ`` and ``q = (y₊ + y₋) / 2γ`` of each pair this is ``Σ o oᵀ + Σ q qᵀ``
+    and a share of ``(Σ q)(Σ q)ᵀ``, which is the same as ``Σ o oᵀ + Σ r rᵀ`` with ``r = q + c Σ q``.
+    """
+    k, half = width(moving), 0.5 / math.sqrt(reach)
+    more = half * (math.sqrt(1.0 + k * bend / reach) - 1.0) / k
+    for p in range(width(points)):
+        for j in range(k):
+            plus, minus = 1.0 * (p == 1 + j), 1.0 * (p == 1 + k + j)
+            outer = 1.0 * (1 <= p <= 2 * k)
+            signs[j, p] = plus - minus
+            turn[p, j] = half * (plus + minus) + more * outer
+            turn[p, k + j] = half * (plus - minus)
 
 
 @kernel
 def _run(
     model: LinearModel,
     loss: Loss,
+    correlated: bool,
     kind: IntArray,
     anchors: FloatArray,
-    moving: int,
+    moving: Size,
+    latent: Size,
     points: Size,
     spread: tuple[float, float],
     start: FloatArray,
@@ -186,65 +234,91 @@ def _run(
     nis: FloatArray,
     weights: FloatArray,
 ) -> None:
+    """Run the filter; ``latent`` is twice ``moving``.
+
+    ``h(x)`` is seen as ``mean + C u``, u of covariance I, and x as ``mean + L u`` and a rest that
+    no sight tells of. Given the sights u has the information ``M = I + Cᵀ R̄⁻¹ C``: that is reduced,
+    as the covariance of innovations is in a linear filter, but there are fewer u than sights.
+    """
     states, components = model.states, model.components
-    n, m = width(states), width(components)
+    n, m, k_ = width(states), width(components), width(moving)
     reach, bend = spread
     gamma, share = math.sqrt(reach), 0.5 / reach
     x, y, e = scratch(ONE, states), scratch(ONE, states), scratch(ONE, components)
     used, root = scratch(ONE, components), scratch(ONE, components)
-    P, A, L = scratch(states, states), scratch(states, states), scratch(states, states)
-    B, S = scratch(components, states), scratch(components, components)
-    T, shift = scratch(components, components), scratch(ONE, components)
-    X, Y = scratch(states, points), scratch(components, points)
-    ones, signs, off = scratch(ONE, points), scratch(states, points), scratch(_AXES, points)
+    variance, keep = scratch(ONE, components), scratch(ONE, states)
+    P, A, L = scratch(states, states), scratch(states, states), scratch(moving, states)
+    C, W, T = (
+        scratch(components, latent),
+        scratch(components, components),
+        scratch(components, components),
+    )
+    M, V, U = scratch(latent, latent), scratch(latent, states), scratch(latent, latent)
+    g, known = scratch(ONE, latent), scratch(ONE, latent)
+    pivots = scratch(ONE, states)
+    X, Y = scratch(moving, points), scratch(components, points)
+    ones, signs, off = scratch(ONE, points), scratch(moving, points), scratch(_AXES, points)
+    turn, unit = scratch(points, latent), scratch(latent, latent)
     F, F_T, Q, R = model.F, model.F_T, model.Q, model.R
     f_step, q_step = n * (F.shape[0] > n), n * (Q.shape[0] > n)
     r_step, a_step = m * (R.shape[0] > m), m * (anchors.shape[0] > m)
     copy_row(x, 0, start, 0, states)
     for i in range(n):
         copy_row(P, i, first, i, states)
+        keep[0, i] = 1.0 if i >= k_ else 0.0
     for p in range(width(points)):
         ones[0, p] = 1.0
-        for j in range(moving):
-            signs[j, p] = 1.0 if p == 1 + j else -1.0 if p == 1 + moving + j else 0.0
+    for i in range(2 * k_):
+        for j in range(2 * k_):
+            unit[i, j] = 1.0 * (i == j)
+    _latent(reach, bend, signs, turn, moving, points)
     for k in range(z.shape[0]):
+        r, a = r_step * k, a_step * k
         move_row(x, 0, F_T, f_step * k, y, 0, states)
         copy_row(x, 0, y, 0, states)
         predict_rows(P, A, F, F_T, f_step * k, Q, q_step * k, states)
-        _columns(P, L, y, moving, states)
-        _points(x, L, gamma, moving, ones, signs, X, states, points)
-        r, a = r_step * k, a_step * k
+        _columns(P, L, y, pivots, keep, states, moving)
+        _points(x, L, gamma, ones, signs, X, moving, points)
         for c in range(m):
             sight_row(kind[c], anchors, a + c, X, ones, off, Y, c, points)
+        for c in range(m):
             centre = Y[c, 0]
             add_row(Y, c, -centre, ones, 0, points)
             if kind[c] == BEARING:
                 turn_row(Y, c, _TURN, points)
-            shift[0, c] = share * dot_rows(Y, c, ones, 0, points)
-            e[0, c] = z[k, c] - centre - shift[0, c]
+            e[0, c] = z[k, c] - centre
+            clear_row(C, c, latent)
+            for p in range(1, 2 * k_ + 1):
+                add_row(C, c, Y[c, p], turn, p, latent)
+            copy_row(W, c, R, r + c, components)
+        for c in range(m):
+            e[0, c] -= share * dot_rows(Y, c, ones, 0, points)
             if kind[c] == BEARING:
-                e[0, c] -= _TURN * np.rint(e[0, c] / _TURN)
-            clear_row(B, c, states)
-            for j in range(moving):
-                slope = 0.5 / gamma * (Y[c, 1 + j] - Y[c, 1 + moving + j])
-                add_row(B, c, slope, L, j, states)
-        for c in range(m):
-            for d in range(c + 1):
-                S[c, d] = R[r + c, d] + bend * shift[0, c] * shift[0, d]
-                S[c, d] += share * dot_rows(Y, c, Y, d, points)
-                S[d, c] = S[c, d]
-            seen = e[0, c] if abs(e[0, c]) < np.inf else np.nan
-            residual[k, c] = seen
-            nis[k, c] = seen * seen / S[c, c]
-        weigh_rows(e, S, R, r, used, root, loss, False, components)
-        for c in range(m):
-            w = used[0, c] / (root[0, c] * root[0, c])
-            weights[k, c] = np.nan if math.isnan(nis[k, c]) else w
-        eliminate_rows(B, S, T, used, states, components)
-        absorb_rows(x, 0, e, B, S, used, states, components)
-        for c in range(m):
+                e[0, c] -= _TURN * np.rint(e[0, c] * (1.0 / _TURN))
+            variance[0, c] = R[r + c, c] + dot_rows(C, c, C, c, latent)
+        note_row(e, variance, residual, nis, k, components)
+        weigh_rows(e, variance, W, R, r, used, root, weights, k, loss, False, components)
+        clear_row(g, 0, latent)
+        if correlated:
+            eliminate_rows(C, W, T, used, latent, components)
+            absorb_rows(g, 0, e, C, W, used, latent, components)
+        else:
+            for c in range(m):
+                used[0, c] /= W[c, c]
+                add_row(g, 0, used[0, c] * e[0, c], C, c, latent)
+        for i in range(2 * k_):
+            copy_row(M, i, unit, i, latent)
+            known[0, i] = 1.0
+            for c in range(m):
+                add_row(M, i, used[0, c] * C[c, i], C, c, latent)
+            clear_row(V, i, states)
+            if i >= k_:
+                copy_row(V, i, L, i - k_, states)
+        eliminate_rows(V, M, U, known, states, latent)
+        absorb_rows(x, 0, g, V, M, known, states, latent)
+        for j in range(k_, 2 * k_):
             for i in range(n):
-                add_row(P, i, -B[c, i] * used[0, c], B, c, states)
+                add_row(P, i, V[j, i] * known[0, j], V, j, states)
         copy_row(mean, k, x, 0, states)
         for i in range(n):
             copy_row(covariance, k * n + i, P, i, states)

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surefix.jit import helper, inlined, kernel
+from surefix.jit import helper, inner, kernel
 from surefix.rows import (
     Size,
     add_product,
@@ -88,7 +88,7 @@ def sight(kind: int, anchor: FloatArray, x: FloatArray, d: int, H: FloatArray) -
     return math.atan2(up, flat)
 
 
-@inlined
+@inner
 def sight_row(
     kind: int,
     anchors: FloatArray,
