@@ -15,11 +15,12 @@ import hashlib
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import typed_passes, untyped_passes
+from numba.core import cgutils, typed_passes, types, untyped_passes
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.lowering import Lower
 from numba.core.runtime.nrt import rtsys
 from numba.core.typed_passes import NativeLowering
 
@@ -92,9 +93,9 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation: Numba's without those that a lean function has no use for."""
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        if not self.state.flags.nrt:
-            return _with_steps(steps, [each for each in steps.passes if each[0] not in _NEEDLESS])
-        return [steps]
+        needless: set[Any] = set() if self.state.flags.nrt else _NEEDLESS
+        kept = [(_LOWERING.get(step, step), said) for step, said in steps.passes]
+        return _with_steps(steps, [each for each in kept if each[0] not in needless])
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
@@ -118,7 +119,7 @@ class PartCompiler(KernelCompiler):
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation, the last but one replaced."""
         (steps,) = super().define_pipelines()
-        swapped = {NativeLowering: _PartLowering}
+        swapped = {_KernelLowering: _PartLowering}
         return _with_steps(steps, [(swapped.get(step, step), said) for step, said in steps.passes])
 
 
@@ -130,8 +131,44 @@ def _with_steps(pipeline: Any, steps: list[Any]) -> list[Any]:
     return [made]
 
 
+class _Lower(Lower):
+    """Translation into the language of LLVM, with less of it where records hold many arrays."""
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        """Translate an expression; of a record that is kept in memory only the field is loaded."""
+        if expr.op == "getattr" and expr.value.name not in self._blk_local_varmap:
+            record = self.typeof(expr.value.name)
+            if isinstance(record, types.BaseNamedTuple) and expr.attr in record.fields:
+                index = record.fields.index(expr.attr)
+                where = cgutils.gep_inbounds(self.builder, self.getvar(expr.value.name), 0, index)
+                field = self.builder.load(where)
+                self.incref(record[index], field)
+                return self.context.cast(self.builder, field, record[index], resty)
+        return super().lower_expr(resty, expr)
+
+    def delvar(self, name: str) -> None:
+        """End the life of a variable, which is nothing to do where no references are counted."""
+        if self.context.enable_nrt or name in self._blk_local_varmap:
+            super().delvar(name)
+            return
+        self._singly_assigned_vars.discard(name)
+        self._alloca_var(name, self.typeof(name))
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):
+class _KernelLowering(NativeLowering):
+    _name = "surefix_kernel_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        return _Lower
+
+
+_LOWERING = {NativeLowering: _KernelLowering}
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(_KernelLowering):
     """Translate a part, and tell the compiler where those that call it find the code."""
 
     _name = "surefix_part_lowering"
