@@ -114,7 +114,8 @@ def epochs_of(
         ]
     )
     if rows.lever.shape[1]:
-        own = np.hstack([part.take(axes, axis=1) for part in (rows.lever[:, 6:9], rows.lever[:, 9:])])
+        arms = rows.lever[:, 6:9], rows.lever[:, 9:]
+        own = np.hstack([part.take(axes, axis=1) for part in arms])
         sigma = np.hypot(sigma, own)
     z[status.verdict >= 0] = np.nan
     fixed = np.full((n, motion.groups), np.nan)
