@@ -133,7 +133,7 @@ class _Lower(Lower):
         """Translate an expression; of a record that is kept in memory only the field is loaded."""
         if expr.op == "getattr" and expr.value.name not in self._blk_local_varmap:
             record: Any = self.typeof(expr.value.name)
-            if isinstance(record, types.BaseNamedTuple) and expr.attr in record.fields:
+            if isinstance(record, types.NamedTuple | types.NamedUniTuple):
                 index = record.fields.index(expr.attr)
                 where = cgutils.gep_inbounds(self.builder, self.getvar(expr.value.name), 0, index)
                 field = self.builder.load(where)
