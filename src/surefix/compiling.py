@@ -1,8 +1,8 @@
 """How Numba compiles kernels and their parts, with less work than it does by itself.
 
 Numba compiles each function that a kernel calls as if Python could call it, too: it optimises it,
-with all that it calls in turn, and makes machine code of it. Here such a *part* is only translated,
-and optimised if it may allocate; it becomes machine code once, inside of the kernel.
+with all that it calls in turn, and makes machine code of it. Here such a *part* is only translated;
+it is optimised and becomes machine code once, inside of the kernel.
 
 What was compiled is kept on disk such that processes which compile at the same time cannot mistake
 the code of one signature, or of an older source, for another.
@@ -15,11 +15,12 @@ import hashlib
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import typed_passes, untyped_passes
+from numba.core import cgutils, typed_passes, types, untyped_passes
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.lowering import Lower
 from numba.core.runtime.nrt import rtsys
 from numba.core.typed_passes import NativeLowering
 
@@ -77,7 +78,7 @@ class _Part(JITCodeLibrary):
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's own way, without a search for garbage.
+    """Numba's own way, without a search for garbage, and with records loaded field by field.
 
     Nearly all that a compilation makes is in use until its end: to look it through again and again
     is a tenth of the time.
@@ -92,9 +93,15 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """Steps of a compilation: Numba's without those that a lean function has no use for."""
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        if not self.state.flags.nrt:
-            return _with_steps(steps, [each for each in steps.passes if each[0] not in _NEEDLESS])
-        return [steps]
+        made = PassManager(steps.pipeline_name)
+        for step, said in steps.passes:
+            if self.state.flags.nrt or step not in _NEEDLESS:
+                made.add_pass(self._translation() if step is NativeLowering else step, said)
+        made.finalize()
+        return [made]
+
+    def _translation(self) -> type[NativeLowering]:
+        return _KernelLowering
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function; as Numba's."""
@@ -115,23 +122,37 @@ class PartCompiler(KernelCompiler):
 
     _library = _Part
 
-    def define_pipelines(self) -> list[Any]:
-        """Steps of a compilation, the last but one replaced."""
-        (steps,) = super().define_pipelines()
-        swapped = {NativeLowering: _PartLowering}
-        return _with_steps(steps, [(swapped.get(step, step), said) for step, said in steps.passes])
+    def _translation(self) -> type[NativeLowering]:
+        return _PartLowering
 
 
-def _with_steps(pipeline: Any, steps: list[Any]) -> list[Any]:
-    made = PassManager(pipeline.pipeline_name)
-    for step, said in steps:
-        made.add_pass(step, said)
-    made.finalize()
-    return [made]
+class _Lower(Lower):
+    """Translation into the language of LLVM, shorter where records hold many arrays."""
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        """Translate an expression; of a record that is kept in memory only the field is loaded."""
+        if expr.op == "getattr" and expr.value.name not in self._blk_local_varmap:
+            record: Any = self.typeof(expr.value.name)
+            if isinstance(record, types.NamedTuple | types.NamedUniTuple):
+                index = record.fields.index(expr.attr)
+                where = cgutils.gep_inbounds(self.builder, self.getvar(expr.value.name), 0, index)
+                field = self.builder.load(where)
+                self.incref(record[index], field)
+                return self.context.cast(self.builder, field, record[index], resty)
+        return super().lower_expr(resty, expr)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):
+class _KernelLowering(NativeLowering):
+    _name = "surefix_kernel_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        return _Lower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(_KernelLowering):
     """Translate a part, and tell the compiler where those that call it find the code."""
 
     _name = "surefix_part_lowering"

@@ -1,8 +1,14 @@
 """What is compiled ahead is what cleaning needs."""
 
+from typing import Any
+
 import numpy as np
+import pytest
 
 import surefix
+from surefix.filters import multi_hypothesis
+from surefix.filters.hypotheses import Prior
+from surefix.filters.records import Epochs, Motion
 from surefix.jit import compilations
 from surefix.pipelines.warmup import PARTS, compile_part, missing, parts_for
 
@@ -27,6 +33,26 @@ def test_nothing_is_left_to_clean() -> None:
             for mode in ("realtime", "lagged"):
                 surefix.clean(log, options=surefix.CleanOptions(mode=mode))
     assert late == []
+
+
+@pytest.mark.parametrize("axes", ["x", "xy", "xyz"])
+def test_the_filter_is_called_with_one_layout(axes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numba compiles a kernel anew for arrays whose columns lie together, not their rows."""
+    layouts = set()
+    run = multi_hypothesis._run
+
+    def noted(motion: Motion, prior: Prior, epochs: Epochs, *more: Any) -> None:
+        layouts.add(all(each.flags.c_contiguous for each in epochs))
+        run(motion, prior, epochs, *more)
+
+    monkeypatch.setattr(multi_hypothesis, "_run", noted)
+    time = np.arange(80.0)
+    log = {"time": time} | {axis: np.sin(time) for axis in axes}
+    velocities = {f"v{axis}": np.cos(time) for axis in axes}
+    for mode in ("realtime", "lagged", "offline"):
+        for given in (log, log | velocities):
+            surefix.clean(given, options=surefix.CleanOptions(mode=mode))
+    assert layouts == {True}
 
 
 def test_a_method_asks_for_the_parts_that_it_calls() -> None:

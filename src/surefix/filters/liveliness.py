@@ -334,8 +334,8 @@ def _evidence(
     columns = [*axes, *(motion.axes + a for a in axes)]
     moving = Motion(motion.order, d, np.full(d, density), by_axis(d), 2 * d, motion.period)
     epochs = recent._replace(
-        z=recent.z[:, columns],
-        variance=recent.variance[:, columns],
+        z=recent.z.take(columns, axis=1),  # C-contiguous, for which the filter is compiled
+        variance=recent.variance.take(columns, axis=1),
         fixed=np.full((len(recent.time), 2 * d), np.nan),
     )
     alike = prior._replace(spread=prior.spread[columns])

@@ -89,7 +89,7 @@ def fit_level(columns: FloatArray, step: FloatArray, state: IntArray) -> Level:
     scale = np.abs(columns).max(axis=0)
     kept = scale > 0.0
     kept[-1] = True
-    scaled = columns[:, kept] / np.where(scale[kept] > 0.0, scale[kept], 1.0)
+    scaled = columns.compress(kept, axis=1) / np.where(scale[kept] > 0.0, scale[kept], 1.0)
     ratios = np.exp(_LOGARITHMS) / usual
     cost, variance = np.empty(len(ratios)), np.empty(len(ratios))
     for i, ratio in enumerate(ratios):

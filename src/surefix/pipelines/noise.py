@@ -129,11 +129,10 @@ def _blocks(
         block = [i for i in axes if (i == 2) == vertical]
         if not block:
             continue
-        declared = np.hstack(
-            [rows.fixes.sigma_position[:, block], rows.fixes.sigma_velocity[:, block]]
-        )
-        still = _still(rows, block, len(sensors))
-        z = np.hstack([np.where(still, np.nan, position[:, block]), velocity[:, block]])
+        stated = rows.fixes.sigma_position, rows.fixes.sigma_velocity
+        declared = np.hstack([part.take(block, axis=1) for part in stated])
+        placed = np.where(_still(rows, block, len(sensors)), np.nan, position.take(block, axis=1))
+        z = np.hstack([placed, velocity.take(block, axis=1)])  # C-contiguous
         known = np.isfinite(rows.tau) & np.isfinite(z).any(axis=1)
         observations = Observations(
             rows.tau[known], z[known], rows.fixes.sensor[known], declared[known]

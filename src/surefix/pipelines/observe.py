@@ -101,19 +101,21 @@ def epochs_of(
     Returns
     -------
     order, epochs
-        (n + g,) which row each epoch is (grid times count on from n), and the epochs.
+        (n + g,) which row each epoch is (grid times count on from n), and the epochs, all arrays of
+        which are C-contiguous: kernels have one compiled form.
     """
     axes, motion, n = list(setup.axes), setup.motion, len(tau)
-    z = np.hstack([position[:, axes], velocity[:, axes]])
+    z = np.hstack([position.take(axes, axis=1), velocity.take(axes, axis=1)])  # C-contiguous
     declared = rows.fixes.sigma_position, rows.fixes.sigma_velocity
     sigma = np.hstack(
         [
-            _sigma(own, figures, sensors, rows.fixes.sensor)[:, axes]
+            _sigma(own, figures, sensors, rows.fixes.sensor).take(axes, axis=1)
             for own, figures in zip(declared, (setup.position, setup.velocity), strict=True)
         ]
     )
     if rows.lever.shape[1]:
-        own = np.hstack([rows.lever[:, 6:9][:, axes], rows.lever[:, 9:][:, axes]])
+        arms = rows.lever[:, 6:9], rows.lever[:, 9:]
+        own = np.hstack([part.take(axes, axis=1) for part in arms])
         sigma = np.hypot(sigma, own)
     z[status.verdict >= 0] = np.nan
     fixed = np.full((n, motion.groups), np.nan)
