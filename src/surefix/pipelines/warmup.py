@@ -83,7 +83,7 @@ def _counted() -> Iterator[list[int]]:
         yield count
 
 
-def _epochs(axes: int) -> tuple[Motion, Epochs]:
+def _epochs(axes: int, order: int = 2) -> tuple[Motion, Epochs]:
     """A vehicle that goes straight on, with a wild fix."""
     time = np.arange(float(_ROWS))
     z = np.full((_ROWS, 2 * axes), np.nan)
@@ -91,7 +91,7 @@ def _epochs(axes: int) -> tuple[Motion, Epochs]:
     z[_ROWS // 2, 0] += 50.0
     none = np.zeros(_ROWS, np.int64)
     epochs = Epochs(time, z, np.ones_like(z), np.full_like(z, np.nan), none, none)
-    return Motion(2, axes, np.full(axes, 0.01), by_axis(axes), 2 * axes, 0.0), epochs
+    return Motion(order, axes, np.full(axes, 0.01), by_axis(axes), 2 * axes, 0.0), epochs
 
 
 def _hypotheses() -> None:
@@ -117,8 +117,8 @@ def _filter() -> None:
 
     _clean("igg3")
     recovery, loss = Recovery(np.inf, 1.0, keeps_rate=True), loss_named("kalman")
-    for axes in (1, 2):
-        motion, epochs = _epochs(axes)
+    for axes, order in ((1, 3), (3, 3), (1, 2), (2, 2)):  # states of a size of their own
+        motion, epochs = _epochs(axes, order)
         _, filtered, _ = filter_track(motion, loss, recovery, epochs, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered)
     prior, locked = supposed(2, 1.0, 1.0, 1.0, 39.5), np.zeros((_ROWS, 2), np.bool_)
