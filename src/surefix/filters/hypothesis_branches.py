@@ -37,7 +37,7 @@ from surefix.filters.hypothesis_drags import (
     outlasts,
     supposes,
 )
-from surefix.filters.hypothesis_manoeuvres import slipped, swift
+from surefix.filters.hypothesis_manoeuvres import belied, slipped, swift
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -300,6 +300,7 @@ def position_branches(
         if strange and not own and prior.manoeuvre > 0.0:
             turns = swift(motion, bank, k, 0, z, variance, time)
             if not math.isnan(turns):
+                turns += belied(motion, prior, bank, k, z, time, sensor)
                 score[total] = base + turns + turned
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1

@@ -13,7 +13,7 @@ from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray
 
-__all__ = ["learn_slip", "slipped", "swift"]
+__all__ = ["belied", "learn_slip", "slipped", "swift"]
 
 _ALIKE = 36.0  # squared distance within which a wrong velocity is off as the one before was
 
@@ -74,6 +74,43 @@ def swift(
         volume *= free
         seen += 1
     return wild_product(square, volume, seen) if longest > 0.0 else np.nan
+
+
+@lean_helper
+def belied(
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    k: int,
+    z: FloatArray,
+    time: float,
+    sensor: int,
+) -> float:
+    """How much less likely a manoeuvre that only a fix shows makes the velocities left out since.
+
+    They were judged by the velocity before it. After it they would be off by as much more, and yet
+    just so that nothing seems to have happened: on the logarithmic scale, at most 0.
+    """
+    d, b = motion.axes, bank
+    before = after = 0.0
+    seen = 0
+    for a in range(d):
+        gap = _since(b.touched[k, a], time)
+        if math.isnan(z[a]) or not gap > 0.0:
+            continue
+        heard = (b.faulty[k] >> sensor) & 1 != 0 and not math.isnan(z[d + a])
+        for s in range(b.heard.shape[0] if b.faulty[k] != 0 and not heard else 0):
+            heard = heard or ((b.faulty[k] >> s) & 1 != 0 and b.heard[s, d + a] > b.touched[k, a])
+        if not heard:
+            continue
+        nu = wrapped(z[a] - b.mean[k, a, 0], motion.period)
+        change = nu * reach(motion.order, 1, gap) / reach(motion.order, 0, gap)
+        off = b.slip[k, a, 0] - b.mean[k, a, 1]
+        w = prior.spread[d + a] ** 2 + b.slip[k, a, 1] + b.covariance[k, a, 1, 1]
+        before += off * off / w
+        after += (off - change) ** 2 / w
+        seen += 1
+    return min(0.5 * (seen + 1) * (math.log1p(before) - math.log1p(after)), 0.0)
 
 
 @lean_helper
