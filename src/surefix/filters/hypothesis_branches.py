@@ -125,7 +125,7 @@ def velocity_branches(
             for a in range(d):
                 c = d + a
                 if not math.isnan(z[c]):
-                    level, P = slipped(motion, bank, k, a, time, sensor)
+                    level, P = slipped(motion, prior, bank, k, a, time, sensor)
                     alike += log_normal(z[c] - level, P + variance[c])
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:

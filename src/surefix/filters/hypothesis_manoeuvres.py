@@ -33,16 +33,20 @@ def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
 
 @inner
 def slipped(
-    motion: Motion, bank: Bank, k: int, a: int, time: float, sensor: int
+    motion: Motion, prior: Prior, bank: Bank, k: int, a: int, time: float, sensor: int
 ) -> tuple[float, float]:
     """What velocities of axis a that are off alike would show now, and its variance.
 
     It is the track's own velocity and what they are off by, and changes as the former does. It is
-    known from them alone, whatever fixes say meanwhile of how much of it is which.
+    known from them alone, whatever fixes say meanwhile of how much of it is which. Where fixes may
+    be in a drag, what velocities are off by must stay when the track leaves them for the fixes.
     """
     gap = _since(bank.heard[sensor, motion.axes + a], time)
     change = reach(motion.order, 1, gap)
     q: float = motion.density[a]
+    if prior.drag > 0.0:
+        off, r = bank.slip[k, a, 2], bank.slip[k, a, 1]
+        return bank.mean[k, a, 1] + off, 2.0 * q * gap * change * change + 0.5 * r
     level, variance = bank.slip[k, a, 0], bank.slip[k, a, 1] + q * gap * change * change
     if motion.order > 2:
         level += gap * bank.mean[k, a, 2]
@@ -128,17 +132,20 @@ def learn_slip(
     d, distance = motion.axes, 0.0
     for a in range(d):
         if not math.isnan(z[d + a]):
-            level, P = slipped(motion, bank, k, a, time, sensor)
+            level, P = slipped(motion, prior, bank, k, a, time, sensor)
             distance += (z[d + a] - level) ** 2 / (P + variance[d + a])
     alike = (bank.faulty[k] >> sensor) & 1 != 0 and distance < _ALIKE
     for a in range(d):
         if not math.isnan(z[d + a]):
-            level, P = slipped(motion, bank, k, a, time, sensor)
+            level, P = slipped(motion, prior, bank, k, a, time, sensor)
             r = variance[d + a]
             gain = P / (P + r) if alike else 1.0
+            if prior.drag > 0.0:
+                gain, r = 0.5 if alike else 1.0, r / (0.5 if alike else 1.0)
             bank.slip[k, a, 0] = level + gain * (z[d + a] - level)
             bank.slip[k, a, 1] = gain * r
+            bank.slip[k, a, 2] = bank.slip[k, a, 0] - bank.mean[k, a, 1]
         elif not alike:
             spread = prior.spread[d + a]
-            bank.slip[k, a, 0] = bank.mean[k, a, 1]
+            bank.slip[k, a, 0], bank.slip[k, a, 2] = bank.mean[k, a, 1], 0.0
             bank.slip[k, a, 1] = bank.covariance[k, a, 1, 1] + spread * spread
