@@ -103,6 +103,7 @@ CASES = {
     "a run of one of two sensors": ({"axes": 1, "run": (2, 4, 6), "sensors": (0, 1)}, 7),
     "a jump of two sensors": ({"run": range(4, 8), "sensors": (0, 0, 0, 0, 0, 0, 0, 1)}, 8),
     "acceleration": ({"axes": 1, "order": 3, "run": (2, 3)}, 5),
+    "aided acceleration": ({"axes": 1, "order": 3, "velocity": 0.3}, 4),
     "missing": ({"axes": 2, "velocity": 0.3, "missing": 0.3}, 5),
     "three axes": ({"axes": 3}, 4),
     "lost": ({"axes": 2, "run": range(2, 4)}, 6),

@@ -148,6 +148,25 @@ def test_wrong_velocities_do_not_make_the_motion_calmer():
     assert abs(np.mean(errors)) < 0.06
 
 
+def test_how_long_velocities_stay_wrong_and_alike_is_counted():
+    """Runs of 5 … 40 with one error each, then the same velocities off anyhow, then none."""
+    rng = np.random.default_rng(3)
+    for seed in range(3):
+        trial = trial_of("dvl-faults", "aided", seed)
+        prior = learnt(trial).prior
+        assert 0.93 < prior.again < 0.98
+        assert prior.alike > 0.9
+        wild = rng.uniform(20.0, 100.0, trial.velocities.shape) * rng.choice([-1.0, 1.0], 2)
+        wild *= rng.choice([-1.0, 1.0], (len(wild), 1)) * trial.world.sigma_mps
+        velocities = trial.velocity + np.where(trial.bad_velocity, wild, 0.0)
+        noise = trial.world.sigma_mps * rng.standard_normal(wild.shape)
+        scattered = learnt(replace(trial, velocities=velocities + noise)).prior
+        assert scattered.again > 0.93
+        assert scattered.alike < 0.5
+        good = learnt(trial_of("clean", "aided", seed)).prior
+        assert (good.again, good.alike) == pytest.approx((0.9, 0.7), abs=0.02)
+
+
 def test_errors_of_one_axis_are_not_taken_for_errors_of_all():
     for seed in range(6):
         prior = learnt(trial_of("one-axis", "alone", seed, epochs=400)).prior

@@ -122,3 +122,32 @@ def reach(order, component, gap):
 def agility(motion, a, gap):
     """Scale of a change of the highest rate."""
     return 30.0 * np.sqrt(motion.density[a] * gap)
+
+
+def slipped(motion, account, known, a, time, sensor):
+    """What velocities that are off alike would show by now, and its variance."""
+    gap = time - account.heard.get((sensor, a), time)
+    level, variance = account.slip[a]
+    variance += motion.density[a] * gap * reach(motion.order, 1, gap) ** 2
+    if motion.order > 2:
+        m, P = known[a]
+        return level + gap * m[2], variance + gap**2 * P[2, 2]
+    return level, variance
+
+
+def belied(motion, prior, account, known, z, gaps, off, time, sensor):
+    """How much less likely a manoeuvre makes the velocities left out since the axis was used."""
+    told_by = dict.fromkeys(account.faulty, ())
+    for (s, a), when in account.heard.items():
+        told_by |= {s: (*told_by[s], a)} if s in told_by and when > time - gaps.get(a, 0.0) else {}
+    now = [a for a in gaps if sensor in account.faulty and not np.isnan(z[motion.axes + a])]
+    axes = sorted({a for each in told_by.values() for a in each if a in gaps}.union(now))
+    axes = [a for a in axes if gaps[a] > 0.0]
+    before = after = 0.0
+    for a in axes:
+        (level, more), (m, P) = account.slip[a], known[a]
+        rate = off[a] * reach(motion.order, 1, gaps[a]) / reach(motion.order, 0, gaps[a])
+        w = prior.spread[motion.axes + a] ** 2 + more + P[1, 1]
+        before += (level - m[1]) ** 2 / w
+        after += (level - m[1] - rate) ** 2 / w
+    return min(0.5 * (len(axes) + 1) * np.log((1.0 + before) / (1.0 + after)), 0.0)

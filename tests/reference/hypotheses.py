@@ -12,11 +12,13 @@ from scipy.special import logsumexp
 from reference.account import (
     Account,
     agility,
+    belied,
     cauchy,
     moments,
     normal,
     put,
     reach,
+    slipped,
     told,
     wrap,
 )
@@ -125,17 +127,6 @@ def _same(figures, offsets, others, their_offsets, alike):
     return ((other - m) ** 2 / P).sum() <= alike and (np.abs(ratio - 1.0) <= 0.05).all()
 
 
-def _slipped(motion, account, known, a, time, sensor):
-    """What velocities that are off alike would show by now, and its variance."""
-    gap = time - account.heard.get((sensor, a), time)
-    level, variance = account.slip[a]
-    variance += motion.density[a] * gap * reach(motion.order, 1, gap) ** 2
-    if motion.order > 2:
-        m, P = known[a]
-        return level + gap * m[2], variance + gap**2 * P[2, 2]
-    return level, variance
-
-
 def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     """Belongs, usual or poor, or is wrong."""
     d, step = motion.axes, len(steps) - 1
@@ -147,7 +138,7 @@ def _velocity(motion, prior, account, known, z, r, time, sensor, steps):
     wide = np.array([prior.spread[d + a] ** 2 + S[a] for a in seen])
     outside = cauchy(np.array([nu[a] for a in seen]) ** 2 / wide, wide)
     wrong, same = prior.velocity, False
-    level = {a: _slipped(motion, account, known, a, time, sensor) for a in seen}
+    level = {a: slipped(motion, account, known, a, time, sensor) for a in seen}
     if sensor in account.faulty:
         wrong = prior.again
         off = {a: z[d + a] - level[a][0] for a in seen}
@@ -303,6 +294,7 @@ def _position(motion, prior, account, known, z, r, time, sensor, steps):
         free = np.array([(far[a] * agility(motion, a, gaps[a])) ** 2 + S[a] for a in axes])
         off = {a: wrap(z[a] - known[a][0][0], period) for a in axes}
         gain = cauchy(np.array([off[a] for a in axes]) ** 2 / free, free) + np.log(prior.manoeuvre)
+        gain += belied(motion, prior, account, known, z, gaps, off, time, sensor)
         turns = account.turns
         for a in axes:
             if gaps[a] > 0.0:

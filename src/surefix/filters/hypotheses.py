@@ -158,7 +158,8 @@ class Bank(NamedTuple):
     faulty
         (k,) bit mask of the sensors whose last velocity was wrong.
     slip
-        (k, axes, 2) what wrong velocities that are off alike show, m/s, and its variance.
+        (k, axes, 3) what wrong velocities that are off alike show, m/s, its variance, and how much
+        they are off.
     lost, missed
         (k, axes) how many fixes were left out since the last one used, and the first of them, s,
         which means nothing while there are none.
@@ -274,7 +275,7 @@ def no_hypotheses(motion: Motion, most: int = MOST) -> Bank:
         np.full(most, np.nan),
         np.zeros(most, np.int64),
         np.zeros(most, np.int64),
-        np.zeros((most, d, 2)),
+        np.zeros((most, d, 3)),
         np.full((most, d), np.nan),
         np.zeros((most, d), np.int64),
         np.full((most, d), np.nan),

@@ -59,7 +59,7 @@ def _copy(bank: Bank, to: int, k: int, d: int, n: int) -> None:
             for l in range(n):
                 bank.covariance[to, a, j, l] = bank.covariance[k, a, j, l]
         bank.seen[to, a] = bank.seen[k, a]
-        for j in range(2):
+        for j in range(3):
             bank.slip[to, a, j] = bank.slip[k, a, j]
         bank.lost[to, a] = bank.lost[k, a]
         bank.missed[to, a] = bank.missed[k, a]

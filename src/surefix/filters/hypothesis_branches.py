@@ -37,7 +37,7 @@ from surefix.filters.hypothesis_drags import (
     outlasts,
     supposes,
 )
-from surefix.filters.hypothesis_manoeuvres import slipped, swift
+from surefix.filters.hypothesis_manoeuvres import belied, slipped, swift
 from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray, IntArray
@@ -125,7 +125,7 @@ def velocity_branches(
             for a in range(d):
                 c = d + a
                 if not math.isnan(z[c]):
-                    level, P = slipped(motion, bank, k, a, time, sensor)
+                    level, P = slipped(motion, prior, bank, k, a, time, sensor)
                     alike += log_normal(z[c] - level, P + variance[c])
             outside = log_sum(outside + fresh, alike + alike_too)
         if forced[d] != 0.0:
@@ -300,6 +300,7 @@ def position_branches(
         if strange and not own and prior.manoeuvre > 0.0:
             turns = swift(motion, bank, k, 0, z, variance, time)
             if not math.isnan(turns):
+                turns += belied(motion, prior, bank, k, z, time, sensor)
                 score[total] = base + turns + turned
                 parent[total], code[total] = i, MANOEUVRE
                 total += 1

@@ -13,7 +13,7 @@ from surefix.filters.records import Motion
 from surefix.jit import inner, lean_helper
 from surefix.types import FloatArray
 
-__all__ = ["learn_slip", "slipped", "swift"]
+__all__ = ["belied", "learn_slip", "slipped", "swift"]
 
 _ALIKE = 36.0  # squared distance within which a wrong velocity is off as the one before was
 
@@ -33,16 +33,20 @@ def _freed(motion: Motion, a: int, c: int, gap: float, S: float) -> float:
 
 @inner
 def slipped(
-    motion: Motion, bank: Bank, k: int, a: int, time: float, sensor: int
+    motion: Motion, prior: Prior, bank: Bank, k: int, a: int, time: float, sensor: int
 ) -> tuple[float, float]:
     """What velocities of axis a that are off alike would show now, and its variance.
 
     It is the track's own velocity and what they are off by, and changes as the former does. It is
-    known from them alone, whatever fixes say meanwhile of how much of it is which.
+    known from them alone, whatever fixes say meanwhile of how much of it is which. Where fixes may
+    be in a drag, what velocities are off by must stay when the track leaves them for the fixes.
     """
     gap = _since(bank.heard[sensor, motion.axes + a], time)
     change = reach(motion.order, 1, gap)
     q: float = motion.density[a]
+    if prior.drag > 0.0:
+        off, r = bank.slip[k, a, 2], bank.slip[k, a, 1]
+        return bank.mean[k, a, 1] + off, 2.0 * q * gap * change * change + 0.5 * r
     level, variance = bank.slip[k, a, 0], bank.slip[k, a, 1] + q * gap * change * change
     if motion.order > 2:
         level += gap * bank.mean[k, a, 2]
@@ -77,6 +81,43 @@ def swift(
 
 
 @lean_helper
+def belied(
+    motion: Motion,
+    prior: Prior,
+    bank: Bank,
+    k: int,
+    z: FloatArray,
+    time: float,
+    sensor: int,
+) -> float:
+    """How much less likely a manoeuvre that only a fix shows makes the velocities left out since.
+
+    They were judged by the velocity before it. After it they would be off by as much more, and yet
+    just so that nothing seems to have happened: on the logarithmic scale, at most 0.
+    """
+    d, b = motion.axes, bank
+    before = after = 0.0
+    seen = 0
+    for a in range(d):
+        gap = _since(b.touched[k, a], time)
+        if math.isnan(z[a]) or not gap > 0.0:
+            continue
+        heard = (b.faulty[k] >> sensor) & 1 != 0 and not math.isnan(z[d + a])
+        for s in range(b.heard.shape[0] if b.faulty[k] != 0 and not heard else 0):
+            heard = heard or ((b.faulty[k] >> s) & 1 != 0 and b.heard[s, d + a] > b.touched[k, a])
+        if not heard:
+            continue
+        nu = wrapped(z[a] - b.mean[k, a, 0], motion.period)
+        change = nu * reach(motion.order, 1, gap) / reach(motion.order, 0, gap)
+        off = b.slip[k, a, 0] - b.mean[k, a, 1]
+        w = prior.spread[d + a] ** 2 + b.slip[k, a, 1] + b.covariance[k, a, 1, 1]
+        before += off * off / w
+        after += (off - change) ** 2 / w
+        seen += 1
+    return min(0.5 * (seen + 1) * (math.log1p(before) - math.log1p(after)), 0.0)
+
+
+@lean_helper
 def learn_slip(
     motion: Motion,
     prior: Prior,
@@ -91,17 +132,20 @@ def learn_slip(
     d, distance = motion.axes, 0.0
     for a in range(d):
         if not math.isnan(z[d + a]):
-            level, P = slipped(motion, bank, k, a, time, sensor)
+            level, P = slipped(motion, prior, bank, k, a, time, sensor)
             distance += (z[d + a] - level) ** 2 / (P + variance[d + a])
     alike = (bank.faulty[k] >> sensor) & 1 != 0 and distance < _ALIKE
     for a in range(d):
         if not math.isnan(z[d + a]):
-            level, P = slipped(motion, bank, k, a, time, sensor)
+            level, P = slipped(motion, prior, bank, k, a, time, sensor)
             r = variance[d + a]
             gain = P / (P + r) if alike else 1.0
+            if prior.drag > 0.0:
+                gain, r = 0.5 if alike else 1.0, r / (0.5 if alike else 1.0)
             bank.slip[k, a, 0] = level + gain * (z[d + a] - level)
             bank.slip[k, a, 1] = gain * r
+            bank.slip[k, a, 2] = bank.slip[k, a, 0] - bank.mean[k, a, 1]
         elif not alike:
             spread = prior.spread[d + a]
-            bank.slip[k, a, 0] = bank.mean[k, a, 1]
+            bank.slip[k, a, 0], bank.slip[k, a, 2] = bank.mean[k, a, 1], 0.0
             bank.slip[k, a, 1] = bank.covariance[k, a, 1, 1] + spread * spread

@@ -190,6 +190,7 @@ def decide_offline(
     """
     recovery, n = _steady(prior), len(epochs.time)
     said, locked = _in_both_directions(motion, prior, epochs)
+    back = np.zeros_like(said.fixed, dtype=np.bool_)
     for left in reversed(range(_SWEEPS)):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered, in_place=True)
@@ -202,8 +203,12 @@ def decide_offline(
         locked[:, 0] |= amid
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
-        said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
         if left:
+            gone = back & (said.fixed > 0.0) & (fixed == 0.0)  # the others call it back on and on …
+            back |= (said.fixed == 0.0) & (fixed > 0.0)
+            for part, axes in enumerate((slice(motion.axes), slice(motion.axes, None))):
+                locked[:, part] |= gone[:, axes].any(axis=1)  # … and deny it: it stays out
+            said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
             del weight, smoothed  # their memory is for the next
     return said, weight, smoothed
 
