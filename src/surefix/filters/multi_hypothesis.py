@@ -353,6 +353,7 @@ def filter_hypotheses(
         The hypotheses after the series, what their mixture says, and how they came about.
     """
     n, most = len(epochs.time), len(bank.weight)
+    epochs = Epochs._make(np.ascontiguousarray(each) for each in epochs)  # all compiled as one
     after = Bank._make(field.copy() for field in bank)
     place = rows_of(most)
     found = _blank(motion, n)

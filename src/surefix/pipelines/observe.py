@@ -104,16 +104,16 @@ def epochs_of(
         (n + g,) which row each epoch is (grid times count on from n), and the epochs.
     """
     axes, motion, n = list(setup.axes), setup.motion, len(tau)
-    z = np.hstack([position[:, axes], velocity[:, axes]])
+    z = np.hstack([position.take(axes, 1), velocity.take(axes, 1)])
     declared = rows.fixes.sigma_position, rows.fixes.sigma_velocity
     sigma = np.hstack(
         [
-            _sigma(own, figures, sensors, rows.fixes.sensor)[:, axes]
+            _sigma(own, figures, sensors, rows.fixes.sensor).take(axes, 1)
             for own, figures in zip(declared, (setup.position, setup.velocity), strict=True)
         ]
     )
     if rows.lever.shape[1]:
-        own = np.hstack([rows.lever[:, 6:9][:, axes], rows.lever[:, 9:][:, axes]])
+        own = np.hstack([rows.lever[:, 6:9].take(axes, 1), rows.lever[:, 9:].take(axes, 1)])
         sigma = np.hypot(sigma, own)
     z[status.verdict >= 0] = np.nan
     fixed = np.full((n, motion.groups), np.nan)
