@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -41,6 +42,7 @@ def clock(time: float) -> str:
     return f"{datetime.fromtimestamp(tenths // 10, UTC):%H:%M:%S}.{tenths % 10}"
 
 
+@functools.cache
 def _where(mask: int) -> str:
     """Which axes an axis mask means."""
     flat = [name for i, name in enumerate(_AXES) if (mask >> i) & 1]

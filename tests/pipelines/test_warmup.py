@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 import surefix
-from surefix.filters import multi_hypothesis
-from surefix.filters.hypotheses import Prior
-from surefix.filters.records import Epochs, Motion
+from surefix.filters.modes import realtime
+from surefix.filters.records import Epochs, Motion, Recovery
+from surefix.filters.track import start
+from surefix.io.table import from_frame
 from surefix.jit import compilations
+from surefix.pipelines.clean import Source, clean_sources
 from surefix.pipelines.warmup import PARTS, compile_part, missing, parts_for
+from surefix.robust.loss import loss_named
 
 
 def test_a_part_is_compiled_once() -> None:
@@ -36,23 +39,22 @@ def test_nothing_is_left_to_clean() -> None:
 
 
 @pytest.mark.parametrize("axes", ["x", "xy", "xyz"])
-def test_the_filter_is_called_with_one_layout(axes: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Numba compiles a kernel anew for arrays whose columns lie together, not their rows."""
-    layouts = set()
-    run = multi_hypothesis._run
+def test_kernels_get_rows_side_by_side_as_they_were_compiled_for(axes: str) -> None:
+    """Another order of memory would be compiled anew at the first log."""
+    forms: list[bool] = []
 
-    def noted(motion: Motion, prior: Prior, epochs: Epochs, *more: Any) -> None:
-        layouts.add(all(each.flags.c_contiguous for each in epochs))
-        run(motion, prior, epochs, *more)
+    def estimator(motion: Motion, recovery: Recovery, epochs: Epochs, memory: Any) -> Any:
+        forms.extend(column.flags.c_contiguous for column in epochs)
+        return memory, realtime(
+            motion, loss_named("igg3"), recovery, epochs, start(motion, recovery)
+        )[1]
 
-    monkeypatch.setattr(multi_hypothesis, "_run", noted)
     time = np.arange(80.0)
-    log = {"time": time} | {axis: np.sin(time) for axis in axes}
-    velocities = {f"v{axis}": np.cos(time) for axis in axes}
-    for mode in ("realtime", "lagged", "offline"):
-        for given in (log, log | velocities):
-            surefix.clean(given, options=surefix.CleanOptions(mode=mode))
-    assert layouts == {True}
+    log = from_frame({"time": time} | {axis: np.sin(time) for axis in axes})
+    options = surefix.CleanOptions(mode="realtime")
+    clean_sources([Source(iter([log]), "fixes", "log")], options, estimator)
+    assert forms
+    assert all(forms)
 
 
 def test_a_method_asks_for_the_parts_that_it_calls() -> None:

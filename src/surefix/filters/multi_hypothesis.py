@@ -278,7 +278,7 @@ def _run(
                 )
             else:
                 continue
-            if stage == 1:
+            if stage == 1 and prior.drag > 0.0:
                 cap_drags(prior, bank, place, work.score, work.parent, work.code, total)
             count, norm = keep_best(work.score, total, work.chosen, bank.weight)
             found.evidence[k] += norm

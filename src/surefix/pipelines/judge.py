@@ -223,8 +223,11 @@ def _bits(axes: tuple[int, ...], apart: bool) -> IntArray:
 
 
 def _fold(function: np.ufunc, columns: FloatArray) -> FloatArray:
-    """Smallest or largest of the columns, NaN where all are."""
-    return np.asarray(function.reduce(columns, axis=1))
+    """Smallest or largest of the columns, NaN where all are; column by column is sooner."""
+    found = columns[:, 0].copy()
+    for column in columns.T[1:]:
+        function(found, column, out=found)
+    return found
 
 
 def join_status(status: Status, order: IntArray, extra: int) -> Status:

@@ -105,7 +105,7 @@ def epochs_of(
         which are C-contiguous: kernels have one compiled form.
     """
     axes, motion, n = list(setup.axes), setup.motion, len(tau)
-    z = np.hstack([position.take(axes, axis=1), velocity.take(axes, axis=1)])  # C-contiguous
+    z = np.hstack([position.take(axes, axis=1), velocity.take(axes, axis=1)])
     declared = rows.fixes.sigma_position, rows.fixes.sigma_velocity
     sigma = np.hstack(
         [
