@@ -98,9 +98,10 @@ def lean_kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile a kernel that allocates nothing: references to arrays are not counted in it.
 
     Counting them, an atomic operation for each slice, costs a small kernel more than its work. A
-    product and a sum may become one instruction.
+    product and a sum may become one instruction. It lets go of the interpreter, so that what was
+    cleaned is written meanwhile.
     """
-    return _kept(function, **_LEAN)
+    return _kept(function, nogil=True, **_LEAN)
 
 
 def lean_helper(function: Callable[P, T]) -> Callable[P, T]:

@@ -13,6 +13,7 @@ import numpy as np
 from surefix.errors import OptionsError
 from surefix.io.records import believed
 from surefix.io.writers import SUFFIXES, TrackWriter, channel_writer, resampled_writer, track_writer
+from surefix.pipelines.beside import while_next_is_made
 from surefix.pipelines.joining import join, thinned
 from surefix.report.headline import counts
 from surefix.types import BoolArray, Cleaned, CleanedChannel, Event, Track, Verdict
@@ -74,13 +75,17 @@ def deliver(batches: Iterable[Cleaned], outputs: Sequence[str | Path], *, iso: b
     every = 1
     with contextlib.ExitStack() as stack:
         files = _Files(stack, places, iso)
-        for batch in batches:
+
+        def take(batch: Cleaned) -> None:
+            nonlocal kept, every
             files.add(batch)
             for verdict, total in counts(batch.verdicts).items():
                 totals[verdict] += total
             kept.append(thinned(batch, every))
             while len(kept) > 1 and sum(len(part.track.time) for part in kept) > _KEPT:
                 kept, every = [join([thinned(part, 2) for part in kept])], 2 * every
+
+        while_next_is_made(take, batches)
         if not files.written:
             files.add_track(kept[-1])
     whole = join(kept)
