@@ -29,11 +29,15 @@ def begin() -> None:
     pandas, where it is installed, for data frames, which no command meets (.4 s). Both do without
     what cannot be imported; it is hidden only while they look. Modules are no garbage either: that
     the collector goes through them while they are made takes another .15 s.
+
+    Arrow watches for Ctrl-C by itself while it reads a table, and now and then it was lost there.
     """
     gc.set_threshold(_OBJECTS)
     sys.meta_path.insert(0, hidden := _Hidden())
     try:
         import_module("numba.np.arraymath")
-        import_module("pyarrow").array([])
+        arrow = import_module("pyarrow")
+        arrow.array([])
     finally:
         sys.meta_path.remove(hidden)
+    arrow.enable_signal_handlers(False)

@@ -192,3 +192,33 @@ def test_an_older_output_is_replaced_whole(log, out):
     assert process("clean", log, "-o", out).returncode == 0
     assert len(read(out)) == ROWS
     assert [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+INTERRUPTED_WHILE_READING = """
+import os, signal, sys, threading, time
+from surefix.cli_begin import begin
+
+begin()
+import pyarrow as pa, pyarrow.csv as pacsv
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+text, met = pa.py_buffer(b"a,b\\n" + b"1.5,2.5\\n" * 20_000), 0
+for k in range(60):
+    teller = threading.Timer(k * 0.0005, os.kill, (os.getpid(), signal.SIGINT))
+    try:
+        teller.start()
+        until = time.monotonic() + 0.05
+        while time.monotonic() < until or teller.is_alive():
+            pacsv.read_csv(pa.BufferReader(text))
+        time.sleep(0.01)
+    except KeyboardInterrupt:
+        met += 1
+print(met)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+def test_no_interruption_is_lost_while_arrow_reads():
+    words = [sys.executable, "-c", INTERRUPTED_WHILE_READING]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == ["60"]

@@ -115,14 +115,7 @@ def sounders(data, tmp_path_factory):
     }
 
 
-BURST_AT_THE_END = pytest.mark.xfail(
-    reason="several hypotheses follow a burst in the last twenty pings", strict=True
-)
-
-
-@pytest.mark.parametrize(
-    ("name", "spikes"), [("mbdp", 700), pytest.param("knud", 500, marks=BURST_AT_THE_END)]
-)
+@pytest.mark.parametrize(("name", "spikes"), [("mbdp", 700), ("knud", 500)])
 def test_spikes_of_an_echo_sounder_are_gone(sounders, name, spikes):
     depth = sounders[name]
     off = np.abs(depth.raw - running_median(depth.raw.to_numpy()))
