@@ -44,3 +44,14 @@ def test_recorded_figures_are_those_of_the_code(place, methods):
             for method, mean in zip(methods, table.mean[0], strict=True):
                 figure = float(shown[names.index(method)][0] or "nan")
                 assert figure == pytest.approx(float(mean), rel=0.1, nan_ok=True)
+
+
+def test_figures_of_the_default_method_are_those_of_the_code():
+    """Three vehicles with gross errors on one axis each, in real time: the cheapest row."""
+    made = compare(CompareOptions(("multi-hypothesis",), ("one-axis",), ("realtime",), runs=3))
+    text = PAGE.read_text(encoding="utf-8").split("### The default method")[1]
+    (row,) = re.findall(r"^\| `one-axis` \|(.*)\|$", text, re.MULTILINE)
+    shown = [float(each) for each in row.split("|")]
+    aided, alone = (table for table in made.tables if table.key.startswith("rmse_ratio"))
+    for figure, table in zip(shown[4:], (aided, alone), strict=True):
+        assert figure == pytest.approx(float(table.mean[0, 0]), abs=0.01)
