@@ -48,7 +48,11 @@ def test_recorded_figures_are_those_of_the_code(place, methods):
 
 def test_figures_of_the_default_method_are_those_of_the_code():
     """Three vehicles with gross errors on one axis each, in real time: the cheapest row."""
-    made = compare(CompareOptions(("multi-hypothesis",), ("one-axis",), ("realtime",), runs=3))
+    made = compare(
+        CompareOptions(
+            methods=("multi-hypothesis",), scenarios=("one-axis",), modes=("realtime",), runs=3
+        )
+    )
     text = PAGE.read_text(encoding="utf-8").split("### The default method")[1]
     (row,) = re.findall(r"^\| `one-axis` \|(.*)\|$", text, re.MULTILINE)
     shown = [float(each) for each in row.split("|")]
