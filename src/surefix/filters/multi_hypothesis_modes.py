@@ -40,6 +40,7 @@ from surefix.types import BoolArray, FloatArray, IntArray
 __all__ = ["decide_offline", "lagged_hypotheses", "offline_hypotheses", "realtime_hypotheses"]
 
 _SWEEPS = 6
+_DENIED = 2  # times that a review sends away what another called back, until it stays out
 
 
 def realtime_hypotheses(
@@ -190,7 +191,7 @@ def decide_offline(
     """
     recovery, n = _steady(prior), len(epochs.time)
     said, locked = _in_both_directions(motion, prior, epochs)
-    back = np.zeros_like(said.fixed, dtype=np.bool_)
+    back, denied = np.zeros_like(said.fixed, dtype=np.bool_), np.zeros_like(said.fixed)
     for left in reversed(range(_SWEEPS)):
         _, filtered, _ = _filter(motion, recovery, epochs, said, 0, n, start(motion, recovery))
         smoothed = smooth(motion, recovery, epochs.time, filtered, in_place=True)
@@ -204,10 +205,11 @@ def decide_offline(
         if np.array_equal(fixed, said.fixed) and np.array_equal(jump, said.jump):
             break
         if left:
-            gone = back & (said.fixed > 0.0) & (fixed == 0.0)  # the others call it back on and on …
+            denied += back & (said.fixed > 0.0) & (fixed == 0.0)  # called back on and on …
             back |= (said.fixed == 0.0) & (fixed > 0.0)
             for part, axes in enumerate((slice(motion.axes), slice(motion.axes, None))):
-                locked[:, part] |= gone[:, axes].any(axis=1)  # … and deny it: it stays out
+                gone = (denied[:, axes] >= _DENIED).any(axis=1)
+                locked[:, part] |= gone  # … and denied: it stays out
             said = Decisions(fixed, _at_fixes(motion, epochs, jump, fixed), said.run)
             del weight, smoothed  # their memory is for the next
     return said, weight, smoothed
